@@ -178,7 +178,7 @@ def _fit_provenance(selection: Selection, readings: Readings) -> dict[str, objec
 def _term_provenance(term_selection: TermSelection | None) -> dict[str, object]:
     if term_selection is None:
         return {}
-    first, *further = (one.entry() for one in term_selection.terms)
+    first, *further = term_selection.entries
     return {"empirical_term": first} | ({"further_terms": further} if further else {})
 
 

@@ -89,7 +89,7 @@ def test_a_term_that_is_worth_nothing_alone_leaves_the_explanation_as_it_is(sele
     elsewhere = np.array([0.1, 40.0, 40.0, 0.2])
     with_term = wide.score((SpeedInDisc.name,), np.r_[base.fit.parameters, elsewhere], None)
     chosen = Selection(base, with_term, {}, {}, {}, 1)
-    term_selection = TermSelection(chosen, (SelectedTerm(SpeedInDisc, {}, base, 0.0, 1.0),), base)
+    term_selection = TermSelection(chosen, (SelectedTerm(SpeedInDisc, base, 0.0, 1.0),), base)
     monkeypatch.setattr(empirical, "add_term", lambda *_: term_selection)
     named = Selection(base, selector.with_effect(base, "lateral_slip"), {}, {"lateral_slip": 20.0}, {}, 1)
     assert empirical.add_term_and_reconsider(named, selector) == (named, term_selection, selector)

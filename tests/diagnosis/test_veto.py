@@ -16,7 +16,8 @@ from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps
 from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.validation import validated
+from agvbench.diagnosis.selection.validation import predicts_left_out, validated
+from agvbench.diagnosis.selection.variants import with_extended_library
 from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
 from agvbench.diagnosis.terms.speed import SpeedInDisc
 from agvbench.vehicle.geometry import Geometry
@@ -59,7 +60,7 @@ def spoilt(found):
 
 def test_a_term_that_makes_it_worse_is_withdrawn_and_the_effects_are_asked_alone(found, spoilt):
     good, kept = found
-    disc = SelectedTerm(SpeedInDisc, {}, good.base, 100.0, 1e-4)
+    disc = SelectedTerm(SpeedInDisc, good.base, 100.0, 1e-4)
     wrong = TermSelection(spoilt, (disc,), good.base)
     left, term = validated(good, wrong, kept, lambda _: None)
     assert term is None
@@ -69,6 +70,36 @@ def test_a_term_that_makes_it_worse_is_withdrawn_and_the_effects_are_asked_alone
     assert both_wrong.chosen is good.base
     right = TermSelection(good, (disc,), good.base)
     assert validated(spoilt, right, kept, lambda _: None) == (spoilt, right)
+
+
+def test_the_parameters_of_a_term_are_those_of_the_model_that_was_fitted_last(tried):
+    selector, _, _ = tried
+    base, extended = selector.base(), with_extended_library(selector)
+    disc = extended.score((SpeedInDisc.name,), np.r_[base.fit.parameters, 0.1, 0.2, 0.3, 0.4], None)
+    selected = TermSelection(
+        Selection(base, disc, {}, {}, {}, 1), (SelectedTerm(SpeedInDisc, base, 100.0, 1e-4),), base
+    )
+    again = disc.fit.parameters.copy()
+    again[-4:] = 0.15, 0.25, 0.35, 0.45
+    refitted = replace(disc, fit=replace(disc.fit, parameters=again))
+    selected = replace(selected, selection=replace(selected.selection, chosen=refitted))
+    (entry,) = selected.entries
+    assert entry["parameters"] == {"loss": 0.15, "x_m": 0.25, "y_m": 0.35, "radius_m": 0.45}
+
+
+def test_runs_that_are_left_out_are_predicted_better_with_a_cause_that_is_there(tried):
+    selector, _, _ = tried
+    base = selector.base()
+    lag = selector.with_effect(base, "steering_lag")
+    assert predicts_left_out(lag, base, selector)
+    assert not predicts_left_out(base, lag, selector)
+
+
+def test_the_maps_alone_are_not_fitted_again_to_be_compared_with_themselves(tried, monkeypatch):
+    selector, _, _ = tried
+    base = selector.base()
+    monkeypatch.setattr(Selector, "for_batch", None)
+    assert predicts_left_out(base, base, selector)
 
 
 def test_a_cause_that_helps_stays(found):

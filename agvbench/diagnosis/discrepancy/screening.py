@@ -72,11 +72,6 @@ class _Picture(Values):
         return [bend, *centre, 0.0, 0.0][:3]
 
 
-class _Coasting(Values):
-    def __call__(self, coefficients: Floats) -> list[float]:
-        return [float(coefficients[0]) / _COASTS_S]
-
-
 class _Travel(Values):
     def __call__(self, coefficients: Floats) -> list[float]:
         half_width, (reach,) = max(float(coefficients[0]), 0.0), self.fixed
@@ -108,7 +103,7 @@ def options(
     yield terms.SpeedByRunTime, _run_times(rates)
     yield terms.SteeringAtStart, _starts_of_steering(rates, tangents, geometry)
     yield terms.TwistAtStart, _starts(rates)
-    yield terms.TurnWhileCoasting, iter([(_stops(rates), _Coasting())])
+    yield terms.TurnWhileCoasting, iter([(_stops(rates), Values())])
     for term, columns, change in changes(rates, tangents, geometry, regression):
         yield term, iter([(columns, change.values)])
     yield from _logged(rates, tangents, geometry)
@@ -206,9 +201,9 @@ def _starts(rates: Rates) -> Iterator[Option]:
 
 
 def _stops(rates: Rates) -> Columns:
-    """Return the regressor of a turn at the end of each run, in proportion to the speed from which it stops."""
+    """Return the regressor of a curvature while each run ends, on a way in proportion to the speed before."""
     last = np.r_[np.diff(rates.run) != 0, True] / rates.weight
-    return {2: (last * rates.covariates["speed_mps"])[:, None]}
+    return {2: (_COASTS_S * last * rates.covariates["speed_mps"])[:, None]}
 
 
 def _slips(rates: Rates) -> Columns:

@@ -51,7 +51,8 @@ class Candidate:
     @property
     def key(self) -> frozenset[tuple[str, bytes]]:
         """The key that distinguishes this candidate from others with the same name."""
-        return frozenset({(self.name, self.starts.tobytes() + bytes((self.screened, self.patient)))})
+        how = np.array([self.screened, self.patient, self.expected_gain]).tobytes()
+        return frozenset({(self.name, self.starts.tobytes() + how)})
 
 
 def candidates(geometry: Geometry, exclude: Iterable[str] = ()) -> dict[str, Candidate]:

@@ -151,23 +151,21 @@ def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector
 
     A third of the groups is left out at a time, and both models are fitted anew to the others.
     """
-    return _is_no_worse(*(_left_out(model, selector) for model in (chosen, base)))
-
-
-def _left_out(model: ScoredModel, selector: Selector) -> tuple[float, Floats]:
-    """Return what `_in_batch` returns of all runs, each predicted by the model fitted to the other folds."""
-    batch = selector.batch
-    fold = folds(batch.readings.group, RESIDUAL.left_out_folds, selector.seed)
-    deviance, square = 0.0, np.empty(len(fold))
-    for k in range(RESIDUAL.left_out_folds):
+    if chosen.names == base.names:
+        return True
+    batch, count = selector.batch, RESIDUAL.left_out_folds
+    fold = folds(batch.readings.group, count, selector.seed)
+    deviance, square = np.zeros(2), np.empty((2, len(fold)))
+    for k in range(count):
         others, own = (
             Batch(batch.readings.select(runs), batch.maps, batch.geometry, kinds=batch.kinds)
             for runs in (fold != k, fold == k)
         )
-        again = selector.for_batch(others).score(model.names, model.fit.parameters, None)
-        loss, square[fold == k] = _in_batch(again, own)
-        deviance += loss
-    return deviance, square
+        refitted = selector.for_batch(others)
+        for i, model in enumerate((chosen, base)):
+            loss, square[i, fold == k] = _in_batch(refitted.score(model.names, model.fit.parameters, None), own)
+            deviance[i] += loss
+    return _is_no_worse(*zip(deviance.tolist(), square, strict=True))
 
 
 def _is_no_worse(own: tuple[float, Floats], base: tuple[float, Floats]) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,14 +21,13 @@ _FLIPS, _LONGEST_LEVEL = 9999, 40
 
 @dataclass(frozen=True)
 class SelectedTerm:
-    """A discrepancy term of a model, with its parameters by name.
+    """A discrepancy term, and the model ``without`` it.
 
-    ``without`` is the model without it. ``gain`` is that of the term, in cross-validated minus two log likelihood.
-    ``p_value`` is that of such a gain under random signs of the gains of groups.
+    ``gain`` is that of the term, in cross-validated minus two log likelihood. ``p_value`` is that of such a gain under
+    random signs of the gains of groups. Parameters are those of the model that is `chosen`, which may be refitted.
     """
 
     term: type[DiscrepancyTerm]
-    values: Mapping[str, float]
     without: ScoredModel
     gain: float
     p_value: float
@@ -37,40 +35,42 @@ class SelectedTerm:
     @classmethod
     def of(cls, term: type[DiscrepancyTerm], chosen: ScoredModel, without: ScoredModel, seed: int) -> SelectedTerm:
         """Return the term of a model, given the model `without` it."""
-        own = chosen.fit.effect_values()
-        values = {p.name: own[f"{term.name}.{p.name}"] for p in term.parameters()}
         gain = without.loss - chosen.loss
         group = chosen.fit.predictor.readings.group
-        return cls(term, values, without, float(gain.sum()), gain_p_value(gain, group, seed))
+        return cls(term, without, float(gain.sum()), gain_p_value(gain, group, seed))
 
-    @property
-    def regressor(self) -> Regressor | None:
-        """The number per run on which a term of a logged column depends; None for other terms."""
+    def values(self, chosen: ScoredModel) -> dict[str, float]:
+        """Return the term's parameters by name."""
+        own = chosen.fit.effect_values()
+        return {p.name: own[f"{self.term.name}.{p.name}"] for p in self.term.parameters()}
+
+    def regressor(self, chosen: ScoredModel) -> Regressor | None:
+        """Return the number per run on which a term of a logged column depends; None for other terms."""
         if not issubclass(self.term, ByLoggedColumn):
             return None
         regressors = self.without.fit.predictor.readings.logged.regressors
-        return regressors[min(round(self.values["column"]), len(regressors) - 1)]
+        return regressors[min(round(self.values(chosen)["column"]), len(regressors) - 1)]
 
-    @property
-    def covariates(self) -> tuple[str, ...]:
-        """The covariates of the term, the main one first."""
-        return self.term.covariates if self.regressor is None else (self.regressor.column,)
+    def covariates(self, chosen: ScoredModel) -> tuple[str, ...]:
+        """Return the covariates of the term, the main one first."""
+        regressor = self.regressor(chosen)
+        return self.term.covariates if regressor is None else (regressor.column,)
 
-    def entry(self) -> dict[str, object]:
+    def entry(self, chosen: ScoredModel) -> dict[str, object]:
         """Return the entry of the term in the provenance."""
         return {
             "name": self.term.name,
-            "covariate": self.covariates[0],
+            "covariate": self.covariates(chosen)[0],
             "through": self.term.through,
-            "parameters": self._parameters(),
+            "parameters": self._parameters(chosen),
             "gain": self.gain,
             "p_value": self.p_value,
         }
 
-    def _parameters(self) -> dict[str, object]:
+    def _parameters(self, chosen: ScoredModel) -> dict[str, object]:
         """Return the parameters; for a logged column with its mean and deviation in place of its number."""
-        values: dict[str, object] = {**self.values}
-        if (regressor := self.regressor) is not None:
+        values: dict[str, object] = {**self.values(chosen)}
+        if (regressor := self.regressor(chosen)) is not None:
             del values["column"]
             values |= {"mean": regressor.mean, "deviation": regressor.deviation}
             values |= {} if regressor.level is None else {"level": regressor.level[:_LONGEST_LEVEL]}
@@ -94,6 +94,11 @@ class TermSelection:
         """The names of the terms, as a text."""
         return " and ".join(one.term.name for one in self.terms)
 
+    @property
+    def entries(self) -> list[dict[str, object]]:
+        """The entries of the terms in the provenance, with the parameters of the chosen model."""
+        return [one.entry(self.selection.chosen) for one in self.terms]
+
 
 def with_terms_first(rest: list[Dependence], term_selection: TermSelection) -> list[Dependence]:
     """Return the dependences, with those of the terms first."""
@@ -107,13 +112,14 @@ def _with_term_first(rest: list[Dependence], selected: SelectedTerm, chosen: Sco
 
     If a term has several covariates (x and y), the dependence is that with the larger share in the covariate test.
     """
-    own = [d for d in rest if d.covariate in selected.covariates]
+    covariates = selected.covariates(chosen)
+    own = [d for d in rest if d.covariate in covariates]
     if own:
         first = replace(own[0], p_value=min(own[0].p_value, selected.p_value))
         return [first, *(d for d in rest if d is not own[0])]
     with_term, without = (_sum_of_squares(model) for model in (chosen, selected.without))
     share = 1.0 - with_term / max(without, 1e-300)
-    return [Dependence(selected.covariates[0], selected.term.through, selected.p_value, share), *rest]
+    return [Dependence(covariates[0], selected.term.through, selected.p_value, share), *rest]
 
 
 def _sum_of_squares(model: ScoredModel) -> float:
