@@ -5,6 +5,7 @@ What an author of effects needs is here, and what hooks see in `agvbench.effects
 
 from agvbench.effects.actuation_delay import ActuationDelay
 from agvbench.effects.axle_coupling import AxleCoupling
+from agvbench.effects.axle_differential import AxleDifferential
 from agvbench.effects.axle_overrun import AxleOverrun
 from agvbench.effects.axle_speed_mismatch import AxleSpeedMismatch
 from agvbench.effects.base import HOOKS, TIME_HOOKS, Effect, Parameter, Stage, parameter
@@ -32,6 +33,7 @@ __all__ = [
     "TIME_HOOKS",
     "ActuationDelay",
     "AxleCoupling",
+    "AxleDifferential",
     "AxleOverrun",
     "AxleSpeedMismatch",
     "BatteryDroop",

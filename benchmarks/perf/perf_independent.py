@@ -58,12 +58,12 @@ WRONG_DISTANCES = frozenset({"wheelbase_error", "marker_offset"})
 """The axle distances in campaign.toml are wrong by a millimetre or two each, as those that a lab measures."""
 ALWAYS_TRUE: Mapping[str, frozenset[str]] = {
     "state_space": frozenset({"speed_lag", "steering_lag"}),
-    "rigid_body": frozenset({"speed_lag", "steering_lag"}),
+    "rigid_body": frozenset({"speed_lag", "steering_lag", "axle_differential"}),
     "differential_wheels": frozenset({"speed_lag", "steering_lag", "wheel_lag", "actuation_delay"}),
 }
 """Servos and motors of these simulators have a time constant of 1 to 5 ms, with and without a cause.
 
-That of both wheels of a differential vehicle resembles a delay of 5 ms.
+That of both wheels of a differential vehicle resembles a delay of 5 ms. The axles of `rigid_body` share a differential.
 """
 NAMES: Mapping[str, Mapping[str, str]] = {
     "differential_wheels": {"steering_rate_limit": "yaw_acceleration_limit", "motor_inertia": "wheel_lag"}

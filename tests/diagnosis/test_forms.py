@@ -84,3 +84,11 @@ def test_an_axle_that_brakes_and_the_drag_of_turned_wheels_are_both_measured(tin
     values = {effect.name: effect.parameters for effect in found.effects}
     assert values["axle_overrun"]["excess"].value == pytest.approx(2.0, rel=0.15)
     assert values["cornering_speed_loss"]["loss"].value == pytest.approx(0.08, rel=0.1)
+
+
+@pytest.mark.slow
+def test_axles_that_share_a_differential_are_no_axle_that_brakes(tiny_campaign):
+    """Both predict a lower speed where the axles steer differently; the differential's grows with the square of it."""
+    found = diagnose(tiny_campaign(Tiny(has_differential=True)))
+    assert {effect.name for effect in found.effects} == {"axle_differential"}
+    assert found.effects[0].parameters["share"].value == pytest.approx(1.0, abs=0.15)

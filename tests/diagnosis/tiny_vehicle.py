@@ -75,6 +75,7 @@ class Tiny:
     rear_from_front: float = 0.0
     cornering_loss: float = 0.0
     overrun: float = 0.0
+    has_differential: bool = False
     reverse_gain: float = 0.0
     axle_ratio: float = 0.0
     front_drive_share: float = 0.5
@@ -196,6 +197,8 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         forward = v * (share * math.cos(df) + (1.0 - share) * (1.0 + tiny.axle_ratio) * math.cos(dr))
         if tiny.overrun:
             forward = balanced(s * math.cos(df), s * math.cos(dr), drag, tiny.overrun)
+        if tiny.has_differential:
+            forward = 2.0 * v / (1.0 / math.cos(df) + 1.0 / math.cos(dr))
         longer = 0.5 * (tiny.wheelbase_m - FRONT_M - REAR_M)
         front_m, rear_m = FRONT_M + longer - tiny.marker_forward_m, REAR_M + longer + tiny.marker_forward_m
         side = forward * (front_m * math.tan(dr) + rear_m * math.tan(df)) / tiny.wheelbase_m

@@ -30,6 +30,7 @@ SIZES: Mapping[str, Mapping[str, float]] = {
     "wheel_diameter_mismatch": {"curvature_per_m": 0.05},
     "axle_speed_mismatch": {"ratio": 0.1},
     "axle_overrun": {"excess": 1.5},
+    "axle_differential": {"share": 0.8},
     "floor_tilt": {"drift_mps": 0.01, "direction_rad": 0.8},
     "mocap_latency": {"latency_s": 0.06},
     "marker_offset": {"forward_m": 0.02, "left_m": -0.015},
@@ -166,6 +167,9 @@ def _equations(get, aims, axles, servos, begin):  # type: ignore[no-untyped-def]
         lf, lr = LF + longer, LR + longer
         beta = math.atan((lf * math.tan(dr) + lr * math.tan(df)) / (lf + lr))
         speed = _balanced([vf * math.cos(df), vr * math.cos(dr)], drag, 1.0 + get("axle_overrun", "excess"))
+        middle = 2.0 / (1.0 / math.cos(df) + 1.0 / math.cos(dr))  # a differential keeps the mean of the wheels' speeds
+        mean = (math.cos(df) + math.cos(dr)) / 2.0
+        speed *= 1.0 + get("axle_differential", "share") * (middle / mean - 1.0)
         speed /= math.cos(beta)
         curvature = math.cos(beta) * (math.tan(df) - math.tan(dr)) / (lf + lr)
         # Effects of the body act in the order of the library: the wheelbase comes after slip and wheels.

@@ -31,6 +31,7 @@ from agvbench.simulator.hidden.constants import (
     RUNOUT_PERIOD,
     RUNOUT_PHASE,
     RUNOUT_TRACK,
+    SHARED_BY_DIFFERENTIAL,
     SLIP_LINEAR,
     SLIP_SQUARE,
     TORQUE_STEER,
@@ -92,10 +93,14 @@ def grip(p: Floats, x: float, y: float, heading: float, front: float, rear: floa
 
 @cached_njit()
 def _shared(p: Floats, front: float, rear: float) -> float:
-    """Return the body's share of the wheel speed for both axles' shares: their mean, or nearer to the slower one."""
+    """Return the body's share of the wheel speed for both axles' shares: their mean, or nearer to the slower one.
+
+    Axles that share a differential have one mean of their wheels' speeds: the body has the harmonic mean.
+    """
     stiff = 1.0 + p[OVERRUN]
     heavier, lighter = (front, rear) if front < rear else (rear, front)
-    return (stiff * heavier + lighter) / (stiff + 1.0)
+    share = p[SHARED_BY_DIFFERENTIAL]
+    return (1.0 - share) * (stiff * heavier + lighter) / (stiff + 1.0) + share * 2.0 / (1.0 / front + 1.0 / rear)
 
 
 @cached_njit()

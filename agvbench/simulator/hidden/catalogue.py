@@ -212,7 +212,10 @@ CHANGING = (
 
 
 # Effects of the library that came later: `make_plant` does not draw them, so that its seeds keep their plants.
-LATER = (library_effect("wheelbase_error", {"longer": Size(0.01, 0.04, signed=True)}, True, None, longer="longer"),)
+LATER = (
+    library_effect("wheelbase_error", {"longer": Size(0.01, 0.04, signed=True)}, True, None, longer="longer"),
+    library_effect("axle_differential", {"share": Size(0.9, 1.0, most=1.0)}, shared_by_differential="share"),
+)
 
 
 _RECIPES = (*LIBRARY, *OTHER_VARIANTS, *OUTSIDE, *CHANGING, *LATER, *DIFFERENTIAL)

@@ -46,6 +46,8 @@ NULL: dict[str, float] = {
     # differential vehicles: the front servo is the yaw rate's controller, and the rear one does nothing
     "differential": 0.0, "drive_sign": -1.0, "track": 0.3, "turn_droop": 0.0, "drive_frequency": 0.0,
     "drive_damping": 1.0, "course_curvature": 0.0, "caster_kick": 0.0, "caster_trail": 0.02,
+    # two axles, again
+    "shared_by_differential": 0.0,
 }  # fmt: skip
 """Every mechanism's constants at their null."""
 
@@ -68,6 +70,7 @@ NAMES = (*BASE, *NULL)
     OVERRUN, FRONT_TRIM, LONGER,
     DIFFERENTIAL, DRIVE_SIGN, TRACK, TURN_DROOP, DRIVE_FREQUENCY, DRIVE_DAMPING, COURSE_CURVATURE,
     CASTER_KICK, CASTER_TRAIL,
+    SHARED_BY_DIFFERENTIAL,
 ) = range(len(NAMES))  # fmt: skip
 
 

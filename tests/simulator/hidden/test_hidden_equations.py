@@ -217,6 +217,16 @@ def test_overrun_lets_the_slower_axle_count_more(front, rear):
     assert braked / usual == pytest.approx((3.0 * slower + faster) / 4.0 / mean, rel=1e-4)
 
 
+@pytest.mark.parametrize(("front", "rear"), [(0.5, 0.0), (-0.2, 0.6), (0.5, -0.5)])
+def test_a_differential_keeps_the_mean_of_the_wheels_speeds(front, rear):
+    usual, shared = (
+        np.hypot(*np.diff(poses(plant, [(1.0, 1.0, front, rear)])[-2:, :2], axis=0)[0])
+        for plant in (quiet(), planted("axle_differential", share=1.0))
+    )
+    wheels = [shared / usual * 0.5 * (math.cos(front) + math.cos(rear)) / math.cos(axle) for axle in (front, rear)]
+    assert np.mean(wheels) == pytest.approx(1.0, rel=1e-4)
+
+
 def test_tilt_drifts_in_the_floor_frame_while_moving_not_at_rest():
     plant = planted("floor_tilt", drift_mps=0.01, direction_rad=2.0)
     drift = (0.01 * math.cos(2.0), 0.01 * math.sin(2.0))
