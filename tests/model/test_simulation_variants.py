@@ -231,7 +231,7 @@ def test_an_axle_with_play_is_taken_along_to_where_its_servo_turns_back(law):
     paths = [servo_path(name, values, channel, moments, end) for channel in (0, 1)]
     behind = [with_play(path, rest, width, end) for path, rest in zip(paths, REST, strict=True)]
     truth = drive(behind[0], behind[1], aims(2, moments), np.array(START), FRAMES, moments, 0.0)
-    np.testing.assert_allclose(predicted, truth, atol=5e-5)
+    np.testing.assert_allclose(predicted, truth, atol=1.5e-5)
 
 
 def test_the_branch_for_servos_of_second_order_is_compiled_where_it_is_needed_only():

@@ -3,9 +3,10 @@
 
 A servo obeys δ̇ = (aim − δ) / lag within ± rate (`agvbench.model.simulation.gaps`). Its motion is monotone, so that the
 position of the axle behind a backlash follows from the initial positions. Servos of second order are in
-`agvbench.model.simulation.servos`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a servo does; to reverse
-it brakes to rest first. A drive with inertia, and an elastic drive train without power, obey an equation of second
-order in v, that of a servo with inertia. An array, the *plan*, holds all of this.
+`agvbench.model.simulation.servos`, their axles in `agvbench.model.simulation.followers`. The drive obeys
+v̇ = (aim − v) / lag within limits of v̇, as a servo does; to reverse it brakes to rest first. A drive with inertia, and
+an elastic drive train without power, obey an equation of second order in v, that of a servo with inertia. An array, the
+*plan*, holds all of this.
 """
 
 from __future__ import annotations
@@ -36,10 +37,21 @@ from agvbench.effects.state import (
     STEERING_RATE,
 )
 from agvbench.model.compiled import compiled
+from agvbench.model.simulation.followers import (
+    AIM,
+    AXLE,
+    FOLLOWER_SIZE,
+    HALF_BACKLASH,
+    TOGETHER,
+    follow,
+    plan_follower,
+    way_axle,
+    way_position,
+    within_way,
+)
 from agvbench.model.simulation.gaps import (
     GAP_SETTLED_S,
     GAP_SIZE,
-    RAMP_STEP_S,
     SHORTEST_S,
     gap_at,
     kink_s,
@@ -54,7 +66,6 @@ from agvbench.model.simulation.servos import (
     LIMITED,
     SETTLED_S,
     SPED_S,
-    TURNS_EVERY_S,
     TURNS_S,
     WAY_SIZE,
     closes_s,
@@ -67,10 +78,9 @@ from agvbench.model.simulation.servos import (
 from agvbench.types import Floats
 
 # A plan: for each servo, then for the drive. Times are seconds since the command took effect.
-# A servo: a gap of first order, or a response of second order in the same place; then aim, direction and half the
-# backlash and the position of its axle.
-_AIM, _DIRECTION, _HALF_BACKLASH, _AXLE = range(WAY_SIZE, WAY_SIZE + 4)
-_SERVO_SIZE = WAY_SIZE + 4
+# A servo: a gap of first order, or a response of second order in the same place; then its axle, and the direction.
+_DIRECTION = FOLLOWER_SIZE
+_SERVO_SIZE = FOLLOWER_SIZE + 1
 _FRONT, _REAR = 0, _SERVO_SIZE
 # The drive: its initial gap, and if it reverses the gap from rest.
 _FIRST = 2 * _SERVO_SIZE
@@ -90,10 +100,6 @@ _PLAIN, _ELASTIC, _INERTIAL = range(3)
 # that commands have made recently, and the acceleration of a drive of second order.
 SERVOS_SIZE = 11
 
-# How close to a kink counts as there [s].
-_TOGETHER = 1e-12
-# With backlash and a servo of second order kinks are not computed: steps are short [s].
-_BACKLASH_STEP_S = 0.005
 # A smaller inertia oscillates faster than any camera resolves, and would need a step per oscillation.
 _LEAST_INERTIA_S = 1e-3
 # Time constant over inertia of a servo at a damping ratio of 0.2: position control that rings for longer is of no use.
@@ -103,8 +109,8 @@ _LEAST_DAMPED = 0.4
 @compiled(inner=True)
 def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: float, lag: float, rate: float) -> None:
     plan_gap(plan, servo, abs(aim - position), lag, rate)
-    plan[servo + _AIM], plan[servo + _DIRECTION], plan[servo + _AXLE] = aim, math.copysign(1.0, aim - position), axle
-    events, direction, half = _EVENTS + 4 * (servo > 0), plan[servo + _DIRECTION], plan[servo + _HALF_BACKLASH]
+    plan[servo + AIM], plan[servo + _DIRECTION], plan[servo + AXLE] = aim, math.copysign(1.0, aim - position), axle
+    events, direction, half = _EVENTS + 4 * (servo > 0), plan[servo + _DIRECTION], plan[servo + HALF_BACKLASH]
     plan[events] = kink_s(plan, servo)
     plan[events + 1] = plan[servo + GAP_SETTLED_S]
     # The axle begins to follow; the axle passes the middle.
@@ -117,7 +123,7 @@ def _plan_second_order(
     plan: Floats, servo: int, position: float, turning: float, axle: float, aim: float, ratio: float, state: Floats
 ) -> None:
     events = _EVENTS + 4 * (servo > 0)
-    plan[servo + _AIM], plan[servo + _AXLE] = aim, axle
+    plan[servo + AIM], plan[servo + AXLE] = aim, axle
     plan[events] = plan[events + 2] = math.inf
     if plan[_ORDER] == INERT:
         inertia = max(_LEAST_INERTIA_S, ratio * state[STEERING_INERTIA])
@@ -128,6 +134,7 @@ def _plan_second_order(
         plan_limited(plan, servo, aim - position, -turning, state[STEERING_RATE], limit)
         plan[events], plan[events + 2] = plan[servo + SPED_S], plan[servo + CRUISED_S]
     plan[events + 1], plan[events + 3] = plan[servo + SETTLED_S], plan[servo + TURNS_S]
+    plan_follower(plan, servo, plan[_ORDER])
 
 
 @compiled(inner=True)
@@ -187,7 +194,7 @@ def _rate(position: float, aim: float, state: Floats) -> float:
 @compiled(inner=True)
 def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
     """Compute the plan of servos and drive from their states `servos` to the aims in `state`."""
-    plan[_FRONT + _HALF_BACKLASH], plan[_REAR + _HALF_BACKLASH] = (
+    plan[_FRONT + HALF_BACKLASH], plan[_REAR + HALF_BACKLASH] = (
         0.5 * state[FRONT_BACKLASH],
         0.5 * state[REAR_BACKLASH],
     )
@@ -213,31 +220,8 @@ def plan_command(plan: Floats, state: Floats, servos: Floats) -> None:
 
 
 @compiled(inner=True)
-def _follow(plan: Floats, servo: int, axle: float, position: float) -> float:
-    half = plan[servo + _HALF_BACKLASH]
-    return min(max(axle, position - half), position + half)
-
-
-@compiled(inner=True)
 def _position(plan: Floats, servo: int, tau: float) -> float:
-    return plan[servo + _AIM] - plan[servo + _DIRECTION] * gap_at(plan, servo, tau)
-
-
-@compiled(inner=True)
-def _way_position(plan: Floats, servo: int, tau: float) -> float:
-    return plan[servo + _AIM] - way_at(plan, servo, plan[_ORDER], tau)[0]
-
-
-@compiled(inner=True)
-def _way_axle(plan: Floats, servo: int, tau: float) -> float:
-    """Return the position of the axle behind a servo of second order, with its reversals."""
-    axle = plan[servo + _AXLE]
-    if plan[servo + _HALF_BACKLASH] > 0.0:
-        turns = plan[servo + TURNS_S]
-        while turns < min(tau, plan[servo + SETTLED_S]):
-            axle = _follow(plan, servo, axle, _way_position(plan, servo, turns))
-            turns += plan[servo + TURNS_EVERY_S]
-    return _follow(plan, servo, axle, _way_position(plan, servo, tau))
+    return plan[servo + AIM] - plan[servo + _DIRECTION] * gap_at(plan, servo, tau)
 
 
 @compiled(inner=True)
@@ -258,8 +242,8 @@ def _speed_any_order(plan: Floats, tau: float) -> float:
 @compiled(inner=True)
 def actuate(plan: Floats, tau: float, state: Floats) -> None:
     """Put the axles' angles and the drive's speed into `state`, `tau` seconds after the command took effect."""
-    state[FRONT] = _follow(plan, _FRONT, plan[_FRONT + _AXLE], _position(plan, _FRONT, tau))
-    state[REAR] = _follow(plan, _REAR, plan[_REAR + _AXLE], _position(plan, _REAR, tau))
+    state[FRONT] = follow(plan, _FRONT, plan[_FRONT + AXLE], _position(plan, _FRONT, tau))
+    state[REAR] = follow(plan, _REAR, plan[_REAR + AXLE], _position(plan, _REAR, tau))
     state[SPEED] = _speed(plan, tau)
 
 
@@ -269,7 +253,7 @@ def actuate_any_order(plan: Floats, tau: float, state: Floats) -> None:
     if plan[_ORDER] == FIRST_ORDER:
         actuate(plan, tau, state)
     else:
-        state[FRONT], state[REAR] = _way_axle(plan, _FRONT, tau), _way_axle(plan, _REAR, tau)
+        state[FRONT], state[REAR] = way_axle(plan, _FRONT, plan[_ORDER], tau), way_axle(plan, _REAR, plan[_ORDER], tau)
     state[SPEED] = _speed_any_order(plan, tau)
 
 
@@ -280,21 +264,13 @@ def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
     servos[10] = 0.0 if plan[_DRIVE_ORDER] == _PLAIN else way_at(plan, _RESPONSE, INERT, tau)[1]
     if plan[_ORDER] == FIRST_ORDER:
         servos[0], servos[1] = _position(plan, _FRONT, tau), _position(plan, _REAR, tau)
-        servos[2] = _follow(plan, _FRONT, plan[_FRONT + _AXLE], servos[0])
-        servos[3] = _follow(plan, _REAR, plan[_REAR + _AXLE], servos[1])
+        servos[2] = follow(plan, _FRONT, plan[_FRONT + AXLE], servos[0])
+        servos[3] = follow(plan, _REAR, plan[_REAR + AXLE], servos[1])
         return
-    servos[0], servos[1] = _way_position(plan, _FRONT, tau), _way_position(plan, _REAR, tau)
-    servos[2], servos[3] = _way_axle(plan, _FRONT, tau), _way_axle(plan, _REAR, tau)
+    servos[0], servos[1] = way_position(plan, _FRONT, plan[_ORDER], tau), way_position(plan, _REAR, plan[_ORDER], tau)
+    servos[2], servos[3] = way_axle(plan, _FRONT, plan[_ORDER], tau), way_axle(plan, _REAR, plan[_ORDER], tau)
     servos[6] = -way_at(plan, _FRONT, plan[_ORDER], tau)[1]
     servos[7] = -way_at(plan, _REAR, plan[_ORDER], tau)[1]
-
-
-@compiled(inner=True)
-def _within_way(plan: Floats, servo: int, tau: float, longest: float) -> float:
-    if tau >= plan[servo + SETTLED_S]:
-        return longest
-    step = min(longest, RAMP_STEP_S if plan[servo + _HALF_BACKLASH] == 0.0 else _BACKLASH_STEP_S)
-    return max(SHORTEST_S, longest_step(plan, servo, plan[_ORDER], tau, step))
 
 
 @compiled(inner=True)
@@ -303,7 +279,8 @@ def step_length(plan: Floats, tau: float, longest: float) -> float:
     if plan[_ORDER] == FIRST_ORDER:
         step = within_gap(plan, _REAR, tau, within_gap(plan, _FRONT, tau, longest))
     else:
-        step = _within_way(plan, _REAR, tau, _within_way(plan, _FRONT, tau, longest))
+        order = plan[_ORDER]
+        step = within_way(plan, _REAR, order, tau, within_way(plan, _FRONT, order, tau, longest))
     if plan[_DRIVE_ORDER] != _PLAIN:
         step = max(SHORTEST_S, longest_step(plan, _RESPONSE, INERT, tau, step))
     elif tau >= plan[_RESTS_S]:
@@ -312,6 +289,6 @@ def step_length(plan: Floats, tau: float, longest: float) -> float:
         step = within_gap(plan, _FIRST, tau, step)
     for i in range(_EVENT_COUNT):
         to_event = plan[_EVENTS + i] - tau
-        if _TOGETHER < to_event < step:
+        if TOGETHER < to_event < step:
             step = to_event
     return step
