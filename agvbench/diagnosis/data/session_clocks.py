@@ -158,10 +158,8 @@ def _rows(tracks: Sequence[_Track], steered: Sequence[str], lag_s: float) -> _Ro
     tracks = [one.select(np.arange(len(one.begin_s)) % every == 0) for one in tracks]
     commanded = []
     for one in tracks:
-        instants_s = one.begin_s + _INSTANTS[:, None] * one.length_s
-        commanded.append(
-            [[_lagged(one.commands, role, instants_s - offset, lag_s) for role in steered] for offset in _OFFSETS_S]
-        )
+        instants_s = one.begin_s + _INSTANTS[:, None] * one.length_s - _OFFSETS_S[:, None, None]
+        commanded.append(np.stack([_lagged(one.commands, role, instants_s, lag_s) for role in steered], axis=1))
     turned, speed, elapsed_s = (
         np.concatenate([getattr(one, name) for one in tracks]) for name in ("yaw_rate", "speed", "elapsed_s")
     )
