@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from agvbench.diagnosis.context import DiagnosisContext
@@ -36,22 +38,16 @@ from agvbench.diagnosis.terms import TERMS
 from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
+from agvbench.vehicle.geometry import Geometry
 
 _FOUND_AXLE = '; the {0} axle alone drives the vehicle: declare driven = "{0}" in campaign.toml and vehicle.toml'
 _REMAINS = "structure remains that no effect explains: "
 _DESCRIBE = "describes", "describe"
 
 
-def conclude(
-    context: DiagnosisContext,
-    readings: Readings,
-    split: Split,
-    library: Selection,
-    term_selection: TermSelection | None,
-    static: ScoredModel | None,
-    searched: int,
-) -> Diagnosis:
-    """Return the diagnosis; the test runs are opened here, and nothing is selected afterwards.
+@dataclass(frozen=True)
+class Conclusion:
+    """What was selected, and the runs that it is judged by.
 
     Parameters
     ----------
@@ -66,56 +62,92 @@ def conclude(
     searched
         Number of runs used in the selection.
     """
-    selection = term_selection.selection if term_selection else library
-    fit = selection.chosen.fit
-    every = predictor_for(library, term_selection, readings)
-    batch, has_variants = every.batch, bool(effect_variants().keys() & set(selection.chosen.names))
-    poses, before = (
-        every.predict(fit.parameters),
-        _predicted_before(context.vehicle, readings, static or selection.base),
-    )
-    covariance = end_covariance(every, fit)
-    # The validation runs influenced the selection, and are not tested; the repeatability depends on no selection.
-    tested = assess(readings, split.test, before, poses, covariance, repeats=~split.training)
-    if tested is None:
-        return context.not_identifiable(readings, "there are no repeats among the runs, and so no repeatability")
-    rest, likely = _remaining_dependences(batch, poses, term_selection, context.seed)
-    if changes := _changes(batch, fit.parameters, poses, context.seed):
-        rest = _with_changes(
-            rest, changes, len(term_selection.terms) if term_selection else 0, is_logged=bool(readings.logged.columns)
+
+    context: DiagnosisContext
+    readings: Readings
+    split: Split
+    library: Selection
+    term_selection: TermSelection | None
+    static: ScoredModel | None
+    searched: int
+
+    @property
+    def selection(self) -> Selection:
+        """The selection with discrepancy terms, if there are any."""
+        return self.term_selection.selection if self.term_selection else self.library
+
+    def diagnosis(self) -> Diagnosis:
+        """Return the diagnosis; the test runs are opened here, and nothing is selected afterwards."""
+        readings, chosen = self.readings, self.selection.chosen
+        every = predictor_for(self.library, self.term_selection, readings)
+        poses = every.predict(chosen.fit.parameters)
+        before = _predicted_before(self.context.vehicle, readings, self.static or self.selection.base)
+        covariance = end_covariance(every, chosen.fit)
+        # The validation runs influenced the selection, and are not tested; the repeatability depends on no selection.
+        tested = assess(readings, self.split.test, before, poses, covariance, repeats=~self.split.training)
+        if tested is None:
+            return self.context.not_identifiable(
+                readings, "there are no repeats among the runs, and so no repeatability"
+            )
+        rest, likely = self._dependences(every.batch, poses)
+        found = with_residuals(self._found(tested, rest, likely), readings, self.split.test, before, poses)
+        if self.term_selection or effect_variants().keys() & set(chosen.names):
+            return found
+        return with_next_experiment(found, self.selection, readings, self.context.header, self.context.seed)
+
+    def _dependences(self, batch: Batch, poses: Floats) -> tuple[list[Dependence], list[Dependence]]:
+        """Return the significant and the likely dependences of the residual, with those of repeats."""
+        term_selection, seed = self.term_selection, self.context.seed
+        rest, likely = _remaining_dependences(batch, poses, term_selection, seed)
+        if changes := _changes(batch, self.selection.chosen.fit.parameters, poses, seed):
+            terms = len(term_selection.terms) if term_selection else 0
+            rest = _with_changes(rest, changes, terms, is_logged=bool(self.readings.logged.columns))
+        return rest, likely
+
+    def _found(self, tested: Assessment, rest: list[Dependence], likely: list[Dependence]) -> Diagnosis:
+        """Return the diagnosis without the table of residuals and without the run to drive next."""
+        context, selection = self.context, self.selection
+        fit = selection.chosen.fit
+        omitted, checks = (
+            omitted_effects(fit),
+            check_priors(selection, candidates_for(context.vehicle, self._geometry)[0]),
         )
-    omitted = omitted_effects(fit)
-    effects = named_effects(selection, bounds_of(selection.chosen.names), omitted) + map_effects(fit, context.vehicle)
-    checks = check_priors(selection, candidates_for(context.vehicle, context.geometry)[0])
-    effects = with_evidence(effects, checks)
-    significant = term_selection is not None or tested.has_lack_of_fit or bool(rest)
-    verdict, why = _verdict(effects, significant, rest, term_selection)
-    if significant and not rest and likely:
-        rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
-    if static is not None:
-        why += _FOUND_AXLE.format(batch.geometry.driven)
-    verdict, why = with_contradictions(verdict, why, checks)
-    found = Diagnosis(
-        verdict,
-        why,
-        effects,
-        significant or any(check.contradicted for check in checks),
-        tuple(rest),
-        _held_out(readings.select(split.test), tested),
-        corrected_vehicle(context.header, context.geometry, fit, fit.predictor.maps, context.seed),
-        selection.rejected,
-        context.provenance(readings)
-        | _fit_provenance(selection, readings)
-        | _split_provenance(split, searched, tested)
-        | ({"driven_axle": batch.geometry.driven} if static is not None else {})
-        | _term_provenance(term_selection)
-        | provenance_of(checks),
-        states=effect_states(fit, effects, omitted),
-    )
-    found = with_residuals(found, readings, split.test, before, poses)
-    if term_selection or has_variants:
-        return found
-    return with_next_experiment(found, selection, readings, context.header, context.seed)
+        effects = named_effects(selection, bounds_of(selection.chosen.names), omitted) + map_effects(
+            fit, context.vehicle
+        )
+        effects = with_evidence(effects, checks)
+        significant = self.term_selection is not None or tested.has_lack_of_fit or bool(rest)
+        verdict, why = _verdict(effects, significant, rest, self.term_selection)
+        if significant and not rest and likely:
+            rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
+        if self.static is not None:
+            why += _FOUND_AXLE.format(self._geometry.driven)
+        verdict, why = with_contradictions(verdict, why, checks)
+        return Diagnosis(
+            verdict,
+            why,
+            effects,
+            significant or any(check.contradicted for check in checks),
+            tuple(rest),
+            _held_out(self.readings.select(self.split.test), tested),
+            corrected_vehicle(context.header, self._geometry, fit, fit.predictor.maps, context.seed),
+            selection.rejected,
+            self._provenance(tested) | provenance_of(checks),
+            states=effect_states(fit, effects, omitted),
+        )
+
+    @property
+    def _geometry(self) -> Geometry:
+        return self.context.geometry
+
+    def _provenance(self, tested: Assessment) -> dict[str, object]:
+        return (
+            dict(self.context.provenance(self.readings))
+            | _fit_provenance(self.selection, self.readings)
+            | _split_provenance(self.split, self.searched, tested)
+            | ({"driven_axle": self._geometry.driven} if self.static is not None else {})
+            | _term_provenance(self.term_selection)
+        )
 
 
 def _predicted_before(vehicle: VehicleModel | None, readings: Readings, static: ScoredModel) -> Floats:

@@ -214,7 +214,7 @@ class ResidualCriteria:
         Parts of the training runs that are predicted by fits to the others, as a further validation.
     ``validation_standard_errors``
         Effects are rejected if the mean squared position error of the validation runs is larger with them by more than
-        this number of its standard errors.
+        this number of its standard errors. For runs that are left out, a smaller difference is chance either way.
     """
 
     within_repeatability: float = 1.25

@@ -10,7 +10,7 @@ import numpy as np
 
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.checks.sufficiency import insufficient_data
-from agvbench.diagnosis.conclusion import conclude
+from agvbench.diagnosis.conclusion import Conclusion
 from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings, read_runs
@@ -144,7 +144,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         return self._predicting(other) if other.library.gains or other.with_term else selected
 
     def _predicting(self, selected: SelectedFromRest) -> SelectedFromRest:
-        """Return what was selected if it predicts runs that are left out of its fit no worse than the maps alone.
+        """Return what was selected if it predicts runs that are left out of its fit better than the maps alone.
 
         While causes are missing, the steps of the cross-validation may be far from a fit without these runs.
         """
@@ -206,9 +206,9 @@ class RunsFromRest(Method[SelectedFromRest]):
         batch, split = selected.selector.batch, selected.split
         readings = replace(readings, preset=batch.readings.preset)
         context = replace(self.context, geometry=batch.geometry)
-        return conclude(
+        return Conclusion(
             context, readings, split, selected.library, selected.with_term, selected.static, len(batch.readings)
-        )
+        ).diagnosis()
 
     def _refitted_and_validated(self, selected: SelectedFromRest, readings: Readings) -> SelectedFromRest:
         """Return the selection refitted to all training runs, or the maps alone if validation rejects it."""

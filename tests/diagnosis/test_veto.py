@@ -16,7 +16,7 @@ from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps
 from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.validation import predicts_left_out, validated
+from agvbench.diagnosis.selection.validation import _is_better, predicts_left_out, validated
 from agvbench.diagnosis.selection.variants import with_extended_library
 from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
 from agvbench.diagnosis.terms.speed import SpeedInDisc
@@ -93,6 +93,17 @@ def test_runs_that_are_left_out_are_predicted_better_with_a_cause_that_is_there(
     lag = selector.with_effect(base, "steering_lag")
     assert predicts_left_out(lag, base, selector)
     assert not predicts_left_out(base, lag, selector)
+
+
+@pytest.mark.parametrize(
+    ("gain_mm2", "deviance", "is_better"),
+    [(60.0, 1.0, True), (5.0, 1.0, False), (5.0, -1.0, True), (-5.0, -1.0, True), (-60.0, -1.0, False)],
+)
+def test_within_chance_the_deviance_decides(gain_mm2, deviance, is_better):
+    """The differences between the runs scatter by 100 mm²: 20 mm² is chance in the mean of 100 runs."""
+    base = np.full(100, 500e-6)
+    own = base - (gain_mm2 + 100.0 * np.tile([-1.0, 1.0], 50)) * 1e-6
+    assert _is_better((deviance, own), (0.0, base)) is is_better
 
 
 def test_the_maps_alone_are_not_fitted_again_to_be_compared_with_themselves(tried, monkeypatch):

@@ -143,13 +143,16 @@ def predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
         return True
     fitted = chosen.fit.predictor.batch
     batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
-    return _is_no_worse(_in_batch(chosen, batch), _in_batch(base, batch))
+    (own, square), (without, square_without) = _in_batch(chosen, batch), _in_batch(base, batch)
+    worse, chance = _difference(square, square_without)
+    return worse <= 0.0 or (own <= without and worse <= chance)
 
 
 def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector) -> bool:
-    """Return whether `chosen` predicts runs that are left out no worse than `base`, as `predicts` compares them.
+    """Return whether `chosen` predicts runs that are left out better than `base`.
 
-    A third of the groups is left out at a time, and both models are fitted anew to the others.
+    A third of the groups is left out at a time, and both models are fitted anew to the others. The squared position
+    errors differ by more than chance, or the deviance decides: here are enough runs to require a gain.
     """
     if chosen.names == base.names:
         return True
@@ -165,14 +168,20 @@ def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector
         for i, model in enumerate((chosen, base)):
             loss, square[i, fold == k] = _in_batch(refitted.score(model.names, model.fit.parameters, None), own)
             deviance[i] += loss
-    return _is_no_worse(*zip(deviance.tolist(), square, strict=True))
+    return _is_better((deviance[0], square[0]), (deviance[1], square[1]))
 
 
-def _is_no_worse(own: tuple[float, Floats], base: tuple[float, Floats]) -> bool:
-    """Compare deviances and mean squared position errors by run (R,); see `predicts`."""
-    worse = own[1] - base[1]
-    chance = RESIDUAL.validation_standard_errors * float(np.std(worse)) / np.sqrt(max(len(worse) - 1, 1))
-    return float(np.mean(worse)) <= 0.0 or (own[0] <= base[0] and float(np.mean(worse)) <= chance)
+def _is_better(own: tuple[float, Floats], base: tuple[float, Floats]) -> bool:
+    """Return whether mean squared position errors by run (R,) are smaller; within chance, the deviances decide."""
+    worse, chance = _difference(own[1], base[1])
+    return worse < -chance or (worse <= chance and own[0] <= base[0])
+
+
+def _difference(own: Floats, base: Floats) -> tuple[float, float]:
+    """Return by how much squared errors by run (R,) exceed others in the mean, and by how much they may by chance."""
+    worse = own - base
+    chance = RESIDUAL.validation_standard_errors * np.std(worse) / np.sqrt(max(len(worse) - 1, 1))
+    return float(np.mean(worse)), float(chance)
 
 
 def _in_batch(model: ScoredModel, batch: Batch) -> tuple[float, Floats]:
