@@ -59,6 +59,7 @@ WRONG_DISTANCES = frozenset({"wheelbase_error", "marker_offset"})
 ALWAYS_TRUE: Mapping[str, frozenset[str]] = {
     "state_space": frozenset({"speed_lag", "steering_lag"}),
     "rigid_body": frozenset({"speed_lag", "steering_lag", "axle_differential"}),
+    "front_steered": frozenset({"speed_lag", "steering_lag", "axle_differential"}),
     "differential_wheels": frozenset({"speed_lag", "steering_lag", "wheel_lag", "actuation_delay"}),
 }
 """Servos and motors of these simulators have a time constant of 1 to 5 ms, with and without a cause.

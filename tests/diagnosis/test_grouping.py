@@ -57,6 +57,32 @@ def test_what_is_set_aside_is_whole_groups_whose_levels_were_driven_elsewhere_to
 
 
 @given(seed=st.integers(0, 50))
+def test_where_every_group_has_levels_of_its_own_near_ones_remain_and_no_map_is_extrapolated(seed):
+    rng, runs = np.random.default_rng(seed), bare_runs()
+    group = group_runs(runs)
+    own = [{role: rng.uniform(-20.0, 20.0) for role in ("drive", "front", "rear")} for _ in range(int(group.max()) + 1)]
+    for i, run in enumerate(runs):
+        levels = {role: getattr(run.commands, role) for role in own[group[i]]}
+        moved = {role: np.where(v == NEUTRAL, v, v + own[group[i]][role]) for role, v in levels.items()}
+        runs[i] = dataclasses.replace(run, commands=dataclasses.replace(run.commands, **moved))
+    held = ~split_runs(runs, group, NEUTRAL_COMMAND, seed).training
+    assert held.sum() >= 0.5 * DATA.test_share * len(runs)
+    assert not set(group[held]) & set(group[~held])
+    for role in ("drive", "front", "rear"):
+        aside, kept = (
+            np.unique(
+                np.concatenate(
+                    [getattr(run.commands, role) for run, out in zip(runs, held.tolist(), strict=True) if out is one]
+                )
+            )
+            for one in (True, False)
+        )
+        assert kept[0] <= aside[0]
+        assert aside[-1] <= kept[-1]
+        assert np.abs(aside[:, None] - kept).min(axis=1).max() <= np.ptp(kept) / 15.0
+
+
+@given(seed=st.integers(0, 50))
 def test_other_validation_runs_leave_the_test_and_every_level_in_the_training(seed):
     runs = bare_runs()
     group = group_runs(runs)

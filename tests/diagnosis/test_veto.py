@@ -15,9 +15,10 @@ from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps
 from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.selection.candidates import candidates
+from agvbench.diagnosis.selection.refused_effects import with_refused_effects
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.validation import _is_better, predicts_left_out, validated
-from agvbench.diagnosis.selection.variants import with_extended_library
+from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
 from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
 from agvbench.diagnosis.terms.speed import SpeedInDisc
 from agvbench.vehicle.geometry import Geometry
@@ -165,3 +166,14 @@ def test_validation_runs_that_reject_everything_join_the_training_runs(tiny_camp
     assert "rejected in validation" in said[repeated - 1]
     assert said[repeated + 1].startswith(f"{again.training.sum()} training runs, {again.validation.sum()} validation")
     assert found.held_out.runs == split.test.sum()
+
+
+def test_a_variant_that_the_simulation_lacks_is_no_further_candidate(tried):
+    selector, _, _ = tried
+    selector = selector.for_batch(selector.batch)
+    selector.candidates |= {"actuation_delay_uneven": variant_candidates()["actuation_delay_uneven"]}
+    base = selector.base()
+    assert "actuation_delay_uneven" not in selector.further(base)
+    assert "actuation_delay_uneven" in with_extended_library(selector).further(base)
+    selection = Selection(base, base, {}, {}, {}, 0)
+    assert with_refused_effects(selection, selector).base is base

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,8 @@ _SAME_LEVEL = 1e-5
 # Of the share that is to be drawn: with less, ends of ranges may lose groups.
 _ENOUGH = 0.75
 _ROLES = ("drive", "front", "rear")
+# Where nearly every group has levels of its own, those near the same one of this number of levels count as one.
+_COARSE_LEVELS = 16
 
 
 def with_common_levels(runs: Sequence[Run]) -> Sequence[Run]:
@@ -68,6 +70,10 @@ def group_runs(runs: Sequence[Run]) -> NDArray[np.int64]:
     return numbers
 
 
+_Shown = tuple[str, float | str]
+"""What a run shows of a command: one of its levels, or a kind of change."""
+
+
 @dataclass(frozen=True)
 class Split:
     """Masks of the training, validation and test runs, (R,) each.
@@ -114,7 +120,9 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, 
     not determine the end of a map. The same holds for every kind of change while the vehicle drives, such as a return
     to neutral: a backlash, which only returns show, would otherwise be found by the test alone. At most a third of the
     runs that steer while they drive is drawn: they are few, and no other run shows a dependence on the steering
-    history. If only a single run can be spared, it is the test run, and there is no validation.
+    history. Where nearly every group has levels of its own, those near the same sixteenth of the range count as one,
+    and the test includes interpolation. If only a single run can be spared, it is the test run, and there is no
+    validation.
 
     Raises
     ------
@@ -170,33 +178,39 @@ def _drawn(
     """Return which runs (R,) are drawn: those of whole groups, or some repeats if no group can be spared.
 
     Two groups with each end of a command's range remain. Where that leaves few runs to draw, an end that only two have
-    may lose one of them.
+    may lose one of them; then near levels count as one.
     """
     order = rng.permutation(np.unique(group)).tolist()
-    for fewest in (2, 3):
-        held = _drawn_groups(runs, group, neutral, order, share, fewest)
-        if np.count_nonzero(held) >= _ENOUGH * share * len(runs):
-            break
+    commands = {g: runs[int(np.argmax(group == g))].commands for g in order}
+    for levels in (_levels(commands), _levels(commands, _COARSE_LEVELS)):
+        for fewest in (2, 3):
+            held = _drawn_groups(group, commands, levels, neutral, share, fewest)
+            if np.count_nonzero(held) >= _ENOUGH * share * len(runs):
+                return held
     return held if held.any() else _some_repeats(group, rng)
 
 
 def _drawn_groups(
-    runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, order: list[int], share: float, fewest: int
+    group: NDArray[np.int64],
+    commands: Mapping[int, Commands],
+    levels: Mapping[int, set[_Shown]],
+    neutral: Command,
+    share: float,
+    fewest: int,
 ) -> NDArray[np.bool_]:
-    """Return which runs (R,) the groups contain that can be drawn in this `order`.
+    """Return which runs (R,) the groups contain that can be drawn in the order of `commands`.
 
     Of an end of a range that at least `fewest` groups have, two remain.
     """
-    commands = {g: runs[int(np.argmax(group == g))].commands for g in order}
-    shown = {g: _levels(own) | _changes_while_driving(own, neutral) for g, own in commands.items()}
+    shown = {g: levels[g] | _changes_while_driving(own, neutral) for g, own in commands.items()}
     uses = Counter(one for own in shown.values() for one in own)
-    ends = _ends(commands.values())
+    ends = _ends(levels.values())
     least = {one: 2 if one in ends and count >= fewest else 1 for one, count in uses.items()}
     steering = np.isin(group, [g for g, own in commands.items() if _steers_while_driving(own, neutral)])
-    held = np.zeros(len(runs), dtype=np.bool_)
-    for g in order:
+    held = np.zeros(len(group), dtype=np.bool_)
+    for g in commands:
         own = group == g
-        if np.count_nonzero(held) + np.count_nonzero(own) > 1.1 * share * len(runs):
+        if np.count_nonzero(held) + np.count_nonzero(own) > 1.1 * share * len(group):
             continue
         if steering[own].any() and np.count_nonzero(held & steering) + np.count_nonzero(own) > np.sum(steering) / 3.0:
             continue
@@ -220,10 +234,10 @@ def _steers_while_driving(commands: Commands, neutral: Command) -> bool:
     return any(role != "drive" for role, _ in _changes_while_driving(commands, neutral))
 
 
-def _changes_while_driving(commands: Commands, neutral: Command) -> set[tuple[str, float | str]]:
+def _changes_while_driving(commands: Commands, neutral: Command) -> set[_Shown]:
     """Return how each channel changes between commands that drive: from neutral, to it, through it, or beside it."""
     drives = commands.drive != neutral.drive
-    found: set[tuple[str, float | str]] = set()
+    found: set[_Shown] = set()
     for role in _ROLES:
         values = getattr(commands, role)
         changes = np.flatnonzero(drives[1:] & drives[:-1] & (np.diff(values) != 0.0))
@@ -234,15 +248,29 @@ def _changes_while_driving(commands: Commands, neutral: Command) -> set[tuple[st
     return found
 
 
-def _ends(commands: Iterable[Commands]) -> set[tuple[str, float | str]]:
+def _levels(commands: Mapping[int, Commands], coarse: int | None = None) -> dict[int, set[_Shown]]:
+    """Return the levels of every command by group.
+
+    With `coarse` they are the nearest of so many levels that divide the range, and its ends: no map is extrapolated.
+    """
+    found: dict[int, set[_Shown]] = {g: set() for g in commands}
+    for role in _ROLES:
+        own = {g: np.unique(getattr(one, role)) for g, one in commands.items()}
+        every = np.concatenate([np.empty(0), *own.values()])
+        step = np.ptp(every) / (coarse - 1) if coarse and len(every) else 0.0
+        for g, levels in own.items():
+            rounded = every.min() + step * np.round((levels - every.min()) / step) if step else levels
+            found[g] |= {(role, float(level)) for level in rounded}
+            ends = np.isin((every.min(), every.max()), levels) if step else ()
+            found[g] |= {(role, name) for name, own_end in zip(("lowest", "highest"), ends, strict=False) if own_end}
+    return found
+
+
+def _ends(levels: Iterable[set[_Shown]]) -> set[_Shown]:
     """Return the lowest and the highest level of each command."""
-    every = list(commands)
-    values = {role: np.concatenate([getattr(own, role) for own in every]) for role in _ROLES}
-    return {(role, float(end)) for role, own in values.items() if len(own) for end in (own.min(), own.max())}
-
-
-def _levels(commands: Commands) -> set[tuple[str, float | str]]:
-    return {(role, float(v)) for role in _ROLES for v in np.unique(getattr(commands, role))}
+    every = set[_Shown]().union(*levels)
+    by_role = [[one for one in every if one[0] == role and isinstance(one[1], float)] for role in _ROLES]
+    return {end for own in by_role if own for end in (min(own), max(own))}
 
 
 def folds(group: NDArray[np.int64], count: int, seed: int) -> NDArray[np.int64]:

@@ -42,8 +42,7 @@ def with_refused_effects(selection: Selection, selector: Selector) -> Selection:
 
 def _refused(current: ScoredModel, selector: Selector) -> Iterator[ScoredModel]:
     """Yield `current` with each further effect that clearly gains in the fit, and not in cross-validation."""
-    causes = {cause_of(name) for name in current.names}
-    for name in (name for name in selector.candidates if cause_of(name) not in causes):
+    for name in selector.further(current):
         if selector.predicted_gain(current, name) > FIT.large_predicted_gain:
             model = selector.with_effect(current, name)
             gain = model.fit_gain_over(current)

@@ -15,6 +15,7 @@ from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.residuals import pose_residuals
 from agvbench.diagnosis.selection.fitted_models import FittedModels, ScoredModel
+from agvbench.effects import effect_kinds
 from agvbench.effects.variants import cause_of
 
 
@@ -66,6 +67,12 @@ class Selector(FittedModels):
         """The least gain of an effect, corrected for the number of candidates."""
         return self.criteria.min_gain + 2.0 * math.log(max(len(self.candidates), 1))
 
+    def further(self, current: ScoredModel) -> list[str]:
+        """Return the candidates with other causes than `current` has; a variant only where it is simulated."""
+        causes = {cause_of(name) for name in current.names}
+        simulated = effect_kinds().keys() | {kind.name for kind in self.batch.kinds}
+        return [name for name in self.candidates if cause_of(name) not in causes and name in simulated]
+
     def for_batch(self, batch: Batch) -> Self:
         """Return a selector with the same candidates for another batch, with an empty cache."""
         return replace(self, batch=batch, candidates=dict(self.candidates), tried=0)
@@ -95,8 +102,7 @@ class Selector(FittedModels):
 
         What is predicted to gain much less than another one does gain is left to the next step.
         """
-        causes = {cause_of(name) for name in current.names}
-        names = [name for name in self.candidates if cause_of(name) not in causes]
+        names = self.further(current)
         predicted = {name: self.predicted_gain(current, name) for name in names}
         larger: dict[str, ScoredModel] = {}
         accepted: list[ScoredModel] = []
@@ -112,8 +118,7 @@ class Selector(FittedModels):
 
     def is_improvable(self, current: ScoredModel) -> bool:
         """Return whether a further candidate improves a model; those that are predicted to gain too little do not."""
-        causes = {cause_of(name) for name in current.names}
-        names = [name for name in self.candidates if cause_of(name) not in causes]
+        names = self.further(current)
         predicted = {name: self.predicted_gain(current, name) for name in names}
         likely = [name for name in names if predicted[name] > self.criteria.superior_share * self.min_gain]
         return any(
@@ -209,7 +214,7 @@ class Selector(FittedModels):
         found, causes = {}, {cause_of(name) for name in current.names}
         for name in self._added_effects(current):
             without = self.without_effect(base, current, name)
-            among_these = (among or {}).get(name, self.candidates)
+            among_these = (among or {}).get(name, self.further(current))
             others = [n for n in among_these if cause_of(n) not in causes]
             worse = {n: m.deviance - current.deviance for n, m in self.likely(without, current, others).items()}
             found[name] = {
