@@ -52,6 +52,22 @@ ALSO_TRUE: Mapping[str, frozenset[str]] = {
     "inclined_floor": frozenset({"speed_lag"}),
     "tether": frozenset({"speed_lag"}),
     "dusty_floor": frozenset({"lateral_slip"}),
+    "servo_deadband": frozenset({"steering_backlash"}),
+    "slow_radio_frames": frozenset({"actuation_delay"}),
+    "esc_soft_start": frozenset({"speed_lag"}),
+    "coast_down": frozenset({"speed_lag"}),
+    "esc_reverse_pause": frozenset({"speed_lag"}),
+    "cogging_start": frozenset({"speed_lag"}),
+    "battery_polarisation": frozenset({"speed_lag"}),  # it sags slowly under load
+    "grip_limit": frozenset({"lateral_slip"}),
+    "soft_tyres": frozenset({"lateral_slip"}),
+    "battery_swap": frozenset({"battery_droop"}),
+    "battery_knee": frozenset({"battery_droop"}),
+    "cold_motor": frozenset({"battery_droop"}),
+    "wet_floor_part": frozenset({"lateral_slip"}),
+    "busy_radio_part": frozenset({"actuation_delay"}),
+    "cold_servo": frozenset({"steering_lag"}),
+    "linkage_wear": frozenset({"steering_backlash"}),
 }
 """Effects and terms that describe a cause of another name, at least in part, and are no wrong name."""
 WRONG_DISTANCES = frozenset({"wheelbase_error", "marker_offset"})
@@ -64,7 +80,8 @@ ALWAYS_TRUE: Mapping[str, frozenset[str]] = {
 }
 """Servos and motors of these simulators have a time constant of 1 to 5 ms, with and without a cause.
 
-That of both wheels of a differential vehicle resembles a delay of 5 ms. The axles of `rigid_body` share a differential.
+That of both wheels of a differential vehicle resembles a delay of 5 ms. The axles of `rigid_body` share a differential,
+and those of some vehicles of `front_steered`.
 """
 NAMES: Mapping[str, Mapping[str, str]] = {
     "differential_wheels": {"steering_rate_limit": "yaw_acceleration_limit", "motor_inertia": "wheel_lag"}
