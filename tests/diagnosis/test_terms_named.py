@@ -29,6 +29,12 @@ OUTSIDE = {
         {"loss_per_rad": 0.25, "time_constant_s": 0.6},
         "history time_in_run_s",
     ),
+    "creep": (
+        Tiny(step_creep=0.15, step_creep_s=1.2),
+        "steering_creep",
+        {"gain": 0.15, "time_constant_s": 1.2},
+        "history time_in_run_s",
+    ),
     "brake": (
         Tiny(brake_s=0.2, brake_turn_per_m=1.5),
         "turn_while_coasting",

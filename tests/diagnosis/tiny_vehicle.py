@@ -88,6 +88,8 @@ class Tiny:
     rub_from_rad: float = 0.3
     yields_s_per_m: float = 0.0
     sag_per_rad: float = 0.0
+    step_creep: float = 0.0
+    step_creep_s: float = 1.0
     sag_s: float = 0.6
     brake_turn_per_m: float = 0.0
     seam_rad: float = 0.0
@@ -132,7 +134,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     x, y, heading = start
     front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
     turning, loose, driven, windup, gap_m = [0.0, 0.0], [front, rear], 0.0, 0.0, 0.0
-    strained = [(front, 0.0), (rear, 0.0)]
+    strained, crept = [(front, 0.0), (rear, 0.0)], [front, rear]
     load, before_asked = 0.0, (front_of(NEUTRAL), rear_of(NEUTRAL))
     poses, times = [], []
     steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
@@ -183,6 +185,8 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
                 (servo, strain(tiny, before, servo - at)) for servo, (at, before) in zip((f, r), strained, strict=True)
             ]
             f, r = f - strained[0][1], r - strained[1][1]
+        crept = [z + (angle - z) * _STEP_S / tiny.step_creep_s for z, angle in zip(crept, (f, r), strict=True)]
+        f, r = (angle + tiny.step_creep * (angle - z) for z, angle in zip(crept, (f, r), strict=True))
         f += tiny.run_out_rad * math.sin(math.tau * driven / 0.8)
         f *= 1.0 + tiny.yields_s_per_m * (abs(s) - 0.2)
         df = (f + tiny.front_from_rear * r) * relief * warm * tiny.steering_factor + tiny.front_trim_rad

@@ -34,7 +34,8 @@ class SteeringTangents:
     They mean nothing for a differential vehicle. ``previous`` (n, 2): those under the previous
     steering command; ``reversal`` (n, 2): those at which each axle last reversed; ``levels`` (n, 3): index of the level
     of drive, front and rear in force; ``lags`` (n, 2, reaches): how far an axle lags behind by a hysteresis of each of
-    `REACHES_RAD`; ``loads`` (n, times): what the servos have moved recently, by each of `RECOVERIES_S` [rad].
+    `REACHES_RAD`; ``loads`` (n, times): what the servos have moved recently, by each of `RECOVERIES_S` [rad];
+    ``creeps`` (n, 2, times): the same of each axle, with its sign.
     """
 
     tangent: Floats
@@ -43,6 +44,7 @@ class SteeringTangents:
     levels: NDArray[np.int64]
     lags: Floats
     loads: Floats
+    creeps: Floats
 
 
 def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> SteeringTangents:
@@ -65,32 +67,37 @@ def steering_tangents(batch: Batch, parameters: Floats, rates: Rates) -> Steerin
                     lags_after(before, travel, reach) if travel else before
                     for before, reach in zip(lags[row - 1, k], REACHES_RAD, strict=True)
                 ]
-    loads = _loads(batch, settled)
-    rows, load = np.empty(len(rates.run), dtype=np.int64), np.empty((len(rates.run), len(RECOVERIES_S)))
+    moves = _moves(batch, settled)
+    rows, moved = np.empty(len(rates.run), dtype=np.int64), np.empty((len(rates.run), *moves.shape[1:]))
     for r in np.unique(rates.run):
         own = rates.run == r
         times, now = batch.readings.runs[r].commands.t_s, rates.covariates["time_in_run_s"][own]
         at = np.searchsorted(times, now, side="right")
         rows[own] = batch.base.row_starts[r] + at
         since = now - np.r_[times[:1], times][at]
-        load[own] = loads[rows[own]] * np.exp(-np.maximum(since, 0.0)[:, None] / RECOVERIES_S)
+        moved[own] = moves[rows[own]] * np.exp(-np.maximum(since, 0.0)[:, None, None] / RECOVERIES_S)
     levels = np.column_stack(
         [np.unique(batch.commands[role], return_inverse=True)[1][rows] for role in ("drive", "front", "rear")]
     )
-    return SteeringTangents(tangent[rows], previous[rows], reversal[rows], levels, lags[rows], load)
+    angles = tangent[rows], previous[rows], reversal[rows]
+    return SteeringTangents(*angles, levels, lags[rows], moved[:, 0], moved[:, 1:])
 
 
-def _loads(batch: Batch, settled: Floats) -> Floats:
-    """Return the load of the servos (rows, times) right after each command, for steady-state angles (rows, 2)."""
-    loads = np.zeros((len(settled), len(RECOVERIES_S)))
+def _moves(batch: Batch, settled: Floats) -> Floats:
+    """Return what the servos have moved recently (rows, 3, times) right after each command.
+
+    That is the sum of both amounts, and the way of either axle with its sign, for steady-state angles (rows, 2).
+    """
+    moves = np.zeros((len(settled), 3, len(RECOVERIES_S)))
     for r, run in enumerate(batch.readings.runs):
         first, last = batch.base.row_starts[r : r + 2]
         times = run.commands.t_s
         left = np.exp(-np.diff(times, prepend=times[0])[:, None] / RECOVERIES_S)
-        moved = np.abs(np.diff(settled[first:last], axis=0)).sum(axis=1)
+        ways = np.diff(settled[first:last], axis=0)
+        ways = np.column_stack([np.abs(ways).sum(axis=1), ways])[:, :, None]
         for row in range(first + 1, last):
-            loads[row] = loads[row - 1] * left[row - first - 1] + moved[row - first - 1]
-    return loads
+            moves[row] = moves[row - 1] * left[row - first - 1] + ways[row - first - 1]
+    return moves
 
 
 class GroupedRegression:

@@ -133,6 +133,7 @@ def _steering(
         columns = {k: np.hstack([shares[k] for shares in both]) for k in both[0]}
         yield terms.SteeringByHistory, iter([(columns, Values())])
         yield terms.SteeringByTravel, _travels(tangents, geometry)
+        yield terms.SteeringCreep, _creeps(tangents, geometry)
 
 
 def _rubbing(angles: Floats) -> Iterator[Option]:
@@ -149,6 +150,11 @@ def _loads(tangents: SteeringTangents) -> Iterator[Option]:
     for number, constant in enumerate(RECOVERIES_S):
         if np.any(tangents.loads[:, number] > 0.0):
             yield {0: -tangents.loads[:, [number]]}, Values(constant)
+
+
+def _creeps(tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
+    for number, constant in enumerate(RECOVERIES_S):
+        yield by_both_axles(tangents.creeps[:, :, number], tangents, geometry), Values(constant)
 
 
 def _travels(tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:

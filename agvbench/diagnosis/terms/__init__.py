@@ -40,6 +40,7 @@ from agvbench.diagnosis.terms.steering import (
     SteeringByHistory,
     SteeringBySpeed,
     SteeringByTravel,
+    SteeringCreep,
 )
 from agvbench.diagnosis.terms.turning import (
     SlipByYawRate,
@@ -84,6 +85,7 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SteeringBySpeed,
     SteeringByHistory,
     SteeringByTravel,
+    SteeringCreep,
     WaveByDistance,
     TurnByDirection,
 )
@@ -117,6 +119,7 @@ __all__ = [
     "SteeringByLoggedColumn",
     "SteeringBySpeed",
     "SteeringByTravel",
+    "SteeringCreep",
     "SteeringLagByCampaignTime",
     "TrimByCampaignTime",
     "TrimByLoggedColumn",

@@ -9,16 +9,21 @@ from typing import ClassVar
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
+    CREPT_AT,
     DRIVE_START,
     FRONT,
     FRONT_AIM,
     FRONT_BEFORE,
+    FRONT_CREPT,
+    FRONT_HELD,
     FRONT_LAGS,
     FRONT_LAGS_AT,
     FRONT_REVERSAL,
     REAR,
     REAR_AIM,
     REAR_BEFORE,
+    REAR_CREPT,
+    REAR_HELD,
     REAR_LAGS,
     REAR_LAGS_AT,
     REAR_REVERSAL,
@@ -167,3 +172,40 @@ class SteeringByTravel(DiscrepancyTerm):
             state[FRONT_LAGS_AT], state[REAR_LAGS_AT] = front, rear
             state[FRONT_AIM] -= half_width_rad * state[FRONT_LAGS]
             state[REAR_AIM] -= half_width_rad * state[REAR_LAGS]
+
+
+@dataclass(frozen=True)
+class SteeringCreep(DiscrepancyTerm):
+    """Axles creep after a step: ``δ ← δ + gain (δ_map − z)``, where z follows the target, ``T ż = δ_map − z``.
+
+    With a gain above 0 they go beyond their target at first and come back; below 0, a last part of the way takes long.
+    Both axles have the same parameters. A visco-elastic linkage creeps (standard linear solid).
+    """
+
+    name: ClassVar[str] = "steering_creep"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("history", "time_in_run_s")
+    through: ClassVar[str] = "steering"
+    longest_step_s: ClassVar[float] = 0.1
+    needs_steered_axles: ClassVar[bool] = True
+
+    gain: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.1)
+    # A shorter one would be the lag of a servo, a longer one a gain that the maps absorb.
+    time_constant_s: float = parameter(unit="s", low=0.15, high=20.0, scale=1.0, null=1.0)
+
+    @staticmethod
+    def aim(state: Floats, gain: float, time_constant_s: float) -> None:
+        """Advance the slow angles to a new command."""
+        if gain != 0.0:
+            left = math.exp(-max(state[TIME] - state[CREPT_AT], 0.0) / time_constant_s)
+            state[FRONT_CREPT] = state[FRONT_HELD] + (state[FRONT_CREPT] - state[FRONT_HELD]) * left
+            state[REAR_CREPT] = state[REAR_HELD] + (state[REAR_CREPT] - state[REAR_HELD]) * left
+            state[FRONT_HELD], state[REAR_HELD], state[CREPT_AT] = state[FRONT_AIM], state[REAR_AIM], state[TIME]
+
+    @staticmethod
+    def steer(state: Floats, gain: float, time_constant_s: float) -> None:
+        """Add a share of the way that the slow angles have left."""
+        if gain != 0.0:
+            left = gain * math.exp(-max(state[TIME] - state[CREPT_AT], 0.0) / time_constant_s)
+            state[FRONT] += left * (state[FRONT_HELD] - state[FRONT_CREPT])
+            state[REAR] += left * (state[REAR_HELD] - state[REAR_CREPT])

@@ -23,6 +23,7 @@ from agvbench.effects.state import (
     BRAKING_LIMIT,
     COAST_RELAXATION,
     COAST_SPRING,
+    CREPT_AT,
     DISTANCE,
     DRIVE_BACKLASH,
     DRIVE_COMMAND,
@@ -34,6 +35,8 @@ from agvbench.effects.state import (
     FRONT_BACKLASH,
     FRONT_BEFORE,
     FRONT_COMMAND,
+    FRONT_CREPT,
+    FRONT_HELD,
     FRONT_LAGS,
     FRONT_LAGS_AT,
     FRONT_MOVED_TO,
@@ -46,6 +49,8 @@ from agvbench.effects.state import (
     REAR_BACKLASH,
     REAR_BEFORE,
     REAR_COMMAND,
+    REAR_CREPT,
+    REAR_HELD,
     REAR_LAG_RATIO,
     REAR_LAGS,
     REAR_LAGS_AT,
@@ -266,7 +271,8 @@ def _drive_run(
     s[FRONT_LAGS] = s[REAR_LAGS] = s[DRIVES] = 0.0
     s[FRONT_LAGS_AT], s[REAR_LAGS_AT] = settled[first, 0], settled[first, 1]
     s[FRONT_MOVED_TO], s[REAR_MOVED_TO] = settled[first, 0], settled[first, 1]
-    s[STEERING_LOAD] = s[STEERING_LOAD_AT] = 0.0
+    s[STEERING_LOAD] = s[STEERING_LOAD_AT] = s[CREPT_AT] = 0.0
+    s[FRONT_CREPT], s[REAR_CREPT] = s[FRONT_HELD], s[REAR_HELD] = settled[first, 0], settled[first, 1]
     driven = front = rear = first
     while now < math.inf:
         _obey(s, p, commands, settled, driven, front, rear, lift, now)
