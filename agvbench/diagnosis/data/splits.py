@@ -17,6 +17,8 @@ _SAME_TIME_S = 0.05
 _SAME_LEVEL = 1e-5
 # Of the share that is to be drawn: with less, ends of ranges may lose groups.
 _ENOUGH = 0.75
+# Of that share, too: with less, levels that are near each other count as one.
+_TOO_FEW = 0.4
 _ROLES = ("drive", "front", "rear")
 # Where nearly every group has levels of its own, those near the same one of this number of levels count as one.
 _COARSE_LEVELS = 16
@@ -120,9 +122,9 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, 
     not determine the end of a map. The same holds for every kind of change while the vehicle drives, such as a return
     to neutral: a backlash, which only returns show, would otherwise be found by the test alone. At most a third of the
     runs that steer while they drive is drawn: they are few, and no other run shows a dependence on the steering
-    history. Where nearly every group has levels of its own, those near the same sixteenth of the range count as one,
-    and the test includes interpolation. If only a single run can be spared, it is the test run, and there is no
-    validation.
+    history. Where nearly every group has levels of its own, those near the same sixteenth of the range of a command with
+    many levels count as one, and the test includes interpolation. If only a single run can be spared, it is the test run,
+    and there is no validation.
 
     Raises
     ------
@@ -178,11 +180,16 @@ def _drawn(
     """Return which runs (R,) are drawn: those of whole groups, or some repeats if no group can be spared.
 
     Two groups with each end of a command's range remain. Where that leaves few runs to draw, an end that only two have
-    may lose one of them; then near levels count as one.
+    may lose one of them. If hardly any run can be drawn, near levels count as one: the maps between them are then
+    tested, too, which errs more than the model where levels are few.
     """
     order = rng.permutation(np.unique(group)).tolist()
     commands = {g: runs[int(np.argmax(group == g))].commands for g in order}
-    for levels in (_levels(commands), _levels(commands, _COARSE_LEVELS)):
+    held = np.zeros(len(runs), dtype=np.bool_)
+    for coarse in (None, _COARSE_LEVELS):
+        if np.count_nonzero(held) >= _TOO_FEW * share * len(runs):
+            break
+        levels = _levels(commands, coarse)
         for fewest in (2, 3):
             held = _drawn_groups(group, commands, levels, neutral, share, fewest)
             if np.count_nonzero(held) >= _ENOUGH * share * len(runs):
@@ -251,13 +258,15 @@ def _changes_while_driving(commands: Commands, neutral: Command) -> set[_Shown]:
 def _levels(commands: Mapping[int, Commands], coarse: int | None = None) -> dict[int, set[_Shown]]:
     """Return the levels of every command by group.
 
-    With `coarse` they are the nearest of so many levels that divide the range, and its ends: no map is extrapolated.
+    With `coarse` they are the nearest of so many levels that divide the range, and its ends: no map is extrapolated. A
+    command with at most twice as many levels keeps its own: maps between few levels are not known.
     """
     found: dict[int, set[_Shown]] = {g: set() for g in commands}
     for role in _ROLES:
         own = {g: np.unique(getattr(one, role)) for g, one in commands.items()}
         every = np.concatenate([np.empty(0), *own.values()])
-        step = np.ptp(every) / (coarse - 1) if coarse and len(every) else 0.0
+        is_dense = coarse is not None and len(np.unique(every)) > 2 * coarse
+        step = np.ptp(every) / (coarse - 1) if coarse and is_dense else 0.0
         for g, levels in own.items():
             rounded = every.min() + step * np.round((levels - every.min()) / step) if step else levels
             found[g] |= {(role, float(level)) for level in rounded}
