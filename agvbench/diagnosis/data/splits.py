@@ -122,9 +122,9 @@ def split_runs(runs: Sequence[Run], group: NDArray[np.int64], neutral: Command, 
     not determine the end of a map. The same holds for every kind of change while the vehicle drives, such as a return
     to neutral: a backlash, which only returns show, would otherwise be found by the test alone. At most a third of the
     runs that steer while they drive is drawn: they are few, and no other run shows a dependence on the steering
-    history. Where nearly every group has levels of its own, those near the same sixteenth of the range of a command with
-    many levels count as one, and the test includes interpolation. If only a single run can be spared, it is the test run,
-    and there is no validation.
+    history. Where nearly every group has levels of its own, those near the same sixteenth of the range of a command
+    with many levels count as one, and the test includes interpolation. If only a single run can be spared, it is the
+    test run, and there is no validation.
 
     Raises
     ------
