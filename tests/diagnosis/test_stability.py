@@ -70,7 +70,9 @@ def drives(seed: int) -> tuple[Rates, SteeringTangents]:
     lags = np.zeros((len(run), 2, len(REACHES_RAD)))
     loads = np.zeros((len(run), len(RECOVERIES_S)))
     # The axles were at neutral before.
-    return rates, SteeringTangents(tangent, np.zeros_like(tangent), tangent, levels, lags, loads)
+    return rates, SteeringTangents(
+        tangent, np.zeros_like(tangent), tangent, levels, lags, loads, np.stack([loads, loads], axis=1)
+    )
 
 
 def change_of(rates: Rates, tangents: SteeringTangents, of: Readings | None = None) -> Dependence | None:

@@ -60,7 +60,9 @@ def screened(rates: Rates) -> list[Start]:
     straight = np.zeros((len(rates.run), 2))
     levels, lags = np.zeros((len(rates.run), 3), dtype=np.int64), np.zeros((len(rates.run), 2, len(REACHES_RAD)))
     loads = np.zeros((len(rates.run), len(RECOVERIES_S)))
-    stands = SteeringTangents(straight, straight, straight, levels, lags, loads)
+    stands = SteeringTangents(
+        straight, straight, straight, levels, lags, loads, np.zeros((len(rates.run), 2, len(RECOVERIES_S)))
+    )
     return screen(rates, stands, GEOMETRY, GROUP, 0)
 
 
