@@ -38,7 +38,6 @@ from agvbench.diagnosis.terms import TERMS
 from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
-from agvbench.vehicle.geometry import Geometry
 
 _FOUND_AXLE = '; the {0} axle alone drives the vehicle: declare driven = "{0}" in campaign.toml and vehicle.toml'
 _REMAINS = "structure remains that no effect explains: "
@@ -108,20 +107,16 @@ class Conclusion:
         """Return the diagnosis without the table of residuals and without the run to drive next."""
         context, selection = self.context, self.selection
         fit = selection.chosen.fit
-        omitted, checks = (
-            omitted_effects(fit),
-            check_priors(selection, candidates_for(context.vehicle, self._geometry)[0]),
-        )
-        effects = named_effects(selection, bounds_of(selection.chosen.names), omitted) + map_effects(
-            fit, context.vehicle
-        )
-        effects = with_evidence(effects, checks)
+        omitted = omitted_effects(fit)
+        checks = check_priors(selection, candidates_for(context.vehicle, context.geometry)[0])
+        effects = named_effects(selection, bounds_of(selection.chosen.names), omitted)
+        effects = with_evidence(effects + map_effects(fit, context.vehicle), checks)
         significant = self.term_selection is not None or tested.has_lack_of_fit or bool(rest)
         verdict, why = _verdict(effects, significant, rest, self.term_selection)
         if significant and not rest and likely:
             rest, why = likely, f"{_REMAINS}it is likely to depend on {likely[0].covariate}"
         if self.static is not None:
-            why += _FOUND_AXLE.format(self._geometry.driven)
+            why += _FOUND_AXLE.format(context.geometry.driven)
         verdict, why = with_contradictions(verdict, why, checks)
         return Diagnosis(
             verdict,
@@ -130,22 +125,18 @@ class Conclusion:
             significant or any(check.contradicted for check in checks),
             tuple(rest),
             _held_out(self.readings.select(self.split.test), tested),
-            corrected_vehicle(context.header, self._geometry, fit, fit.predictor.maps, context.seed),
+            corrected_vehicle(context.header, context.geometry, fit, fit.predictor.maps, context.seed),
             selection.rejected,
             self._provenance(tested) | provenance_of(checks),
             states=effect_states(fit, effects, omitted),
         )
-
-    @property
-    def _geometry(self) -> Geometry:
-        return self.context.geometry
 
     def _provenance(self, tested: Assessment) -> dict[str, object]:
         return (
             dict(self.context.provenance(self.readings))
             | _fit_provenance(self.selection, self.readings)
             | _split_provenance(self.split, self.searched, tested)
-            | ({"driven_axle": self._geometry.driven} if self.static is not None else {})
+            | ({"driven_axle": self.context.geometry.driven} if self.static is not None else {})
             | _term_provenance(self.term_selection)
         )
 

@@ -69,8 +69,8 @@ BODY_ACCELERATION_LIMIT, BODY_BRAKING_LIMIT = range(61, 63)
 STEERING_LOAD, STEERING_LOAD_AT, FRONT_MOVED_TO, REAR_MOVED_TO = range(63, 67)
 # Rate limit of servos of first order that turn to the right over that of servos that turn to the left.
 RIGHT_RATE_RATIO = 67
-# Creep of each axle: the angle that follows its target slowly, at the last command; the target since; that time [s].
-FRONT_CREPT, REAR_CREPT, FRONT_HELD, REAR_HELD, CREPT_AT = range(68, 73)
+# Creep of each axle: the way that it had left at the last command, its target since then, and that time [s].
+FRONT_CREEP, REAR_CREEP, FRONT_HELD, REAR_HELD, CREEP_AT = range(68, 73)
 # What the lab logged about the run, each column standardised; 0 where nothing was logged.
 LOGGED, LOGGED_COUNT = 73, 16
 SIZE = LOGGED + LOGGED_COUNT

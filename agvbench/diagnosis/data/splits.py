@@ -185,16 +185,25 @@ def _drawn(
     """
     order = rng.permutation(np.unique(group)).tolist()
     commands = {g: runs[int(np.argmax(group == g))].commands for g in order}
-    held = np.zeros(len(runs), dtype=np.bool_)
-    for coarse in (None, _COARSE_LEVELS):
-        if np.count_nonzero(held) >= _TOO_FEW * share * len(runs):
-            break
-        levels = _levels(commands, coarse)
-        for fewest in (2, 3):
-            held = _drawn_groups(group, commands, levels, neutral, share, fewest)
-            if np.count_nonzero(held) >= _ENOUGH * share * len(runs):
-                return held
+    levels = _levels(commands)
+    held = _as_many(group, commands, levels, neutral, share)
+    if np.count_nonzero(held) < _TOO_FEW * share * len(runs):
+        held = _as_many(group, commands, _near_levels(levels), neutral, share)
     return held if held.any() else _some_repeats(group, rng)
+
+
+def _as_many(
+    group: NDArray[np.int64],
+    commands: Mapping[int, Commands],
+    levels: Mapping[int, set[_Shown]],
+    neutral: Command,
+    share: float,
+) -> NDArray[np.bool_]:
+    """Return which runs (R,) are drawn; an end that only two groups have loses one of them if there are few others."""
+    held = _drawn_groups(group, commands, levels, neutral, share, 2)
+    if np.count_nonzero(held) >= _ENOUGH * share * len(group):
+        return held
+    return _drawn_groups(group, commands, levels, neutral, share, 3)
 
 
 def _drawn_groups(
@@ -255,24 +264,31 @@ def _changes_while_driving(commands: Commands, neutral: Command) -> set[_Shown]:
     return found
 
 
-def _levels(commands: Mapping[int, Commands], coarse: int | None = None) -> dict[int, set[_Shown]]:
-    """Return the levels of every command by group.
+def _levels(commands: Mapping[int, Commands]) -> dict[int, set[_Shown]]:
+    """Return the levels of every command by group."""
+    return {
+        g: {(role, float(v)) for role in _ROLES for v in np.unique(getattr(own, role))} for g, own in commands.items()
+    }
 
-    With `coarse` they are the nearest of so many levels that divide the range, and its ends: no map is extrapolated. A
-    command with at most twice as many levels keeps its own: maps between few levels are not known.
+
+def _near_levels(levels: Mapping[int, set[_Shown]]) -> dict[int, set[_Shown]]:
+    """Return the nearest of the levels that divide each range evenly, by group, and the ends of the range.
+
+    The ends count by themselves, so that no map is extrapolated. A command with few levels keeps its own: maps between
+    them are not known.
     """
-    found: dict[int, set[_Shown]] = {g: set() for g in commands}
+    every = set[_Shown]().union(*levels.values())
+    near: dict[_Shown, set[_Shown]] = {}
     for role in _ROLES:
-        own = {g: np.unique(getattr(one, role)) for g, one in commands.items()}
-        every = np.concatenate([np.empty(0), *own.values()])
-        is_dense = coarse is not None and len(np.unique(every)) > 2 * coarse
-        step = np.ptp(every) / (coarse - 1) if coarse and is_dense else 0.0
-        for g, levels in own.items():
-            rounded = every.min() + step * np.round((levels - every.min()) / step) if step else levels
-            found[g] |= {(role, float(level)) for level in rounded}
-            ends = np.isin((every.min(), every.max()), levels) if step else ()
-            found[g] |= {(role, name) for name, own_end in zip(("lowest", "highest"), ends, strict=False) if own_end}
-    return found
+        own = sorted(float(level) for of, level in every if of == role)
+        if len(own) <= 2 * _COARSE_LEVELS:
+            near |= {(role, level): {(role, level)} for level in own}
+            continue
+        step = (own[-1] - own[0]) / (_COARSE_LEVELS - 1)
+        near |= {(role, level): {(role, own[0] + step * round((level - own[0]) / step))} for level in own}
+        near[role, own[0]].add((role, "lowest"))
+        near[role, own[-1]].add((role, "highest"))
+    return {g: set[_Shown]().union(*(near[one] for one in own)) for g, own in levels.items()}
 
 
 def _ends(levels: Iterable[set[_Shown]]) -> set[_Shown]:

@@ -126,8 +126,7 @@ def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, na
     causes = {cause_of(present) for present in current.names}
     gain = current.fit_gain_over(without)
     geometry = extended.batch.geometry
-    library = [other for other in extended.candidates if cause_of(other) not in causes]
-    predicted = {other: extended.predicted_gain(without, other) for other in library}
+    predicted = {other: extended.predicted_gain(without, other) for other in extended.further(current)}
     near = {cause_of(other) for other, own in predicted.items() if own >= SELECTION.likely_share * gain}
     variants = [
         v

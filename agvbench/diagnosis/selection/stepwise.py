@@ -211,10 +211,10 @@ class Selector(FittedModels):
         among
             By effect, the others that are fitted in its place; every candidate for effects that it does not contain.
         """
-        found, causes = {}, {cause_of(name) for name in current.names}
+        found, further, causes = {}, self.further(current), {cause_of(name) for name in current.names}
         for name in self._added_effects(current):
             without = self.without_effect(base, current, name)
-            among_these = (among or {}).get(name, self.further(current))
+            among_these = (among or {}).get(name, further)
             others = [n for n in among_these if cause_of(n) not in causes]
             worse = {n: m.deviance - current.deviance for n, m in self.likely(without, current, others).items()}
             found[name] = {

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 from agvbench.effects.base import Effect
+from agvbench.model.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -23,3 +25,9 @@ class DiscrepancyTerm(Effect):
     through: ClassVar[str]
     form_of: ClassVar[frozenset[str]] = frozenset()
     distinguished_by: ClassVar[str] = ""
+
+
+@compiled(inline=True)
+def decayed(value: float, since_s: float, time_constant_s: float) -> float:
+    """Return what is left of a value that decays exponentially, `since_s` seconds later; all of it before that."""
+    return value * math.exp(-max(since_s, 0.0) / time_constant_s)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.diagnosis.terms.base import DiscrepancyTerm
+from agvbench.diagnosis.terms.base import DiscrepancyTerm, decayed
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
     FORWARD,
@@ -208,12 +208,6 @@ class SpeedBySteering(DiscrepancyTerm):
         state[REAR_SPEED] *= 1.0 - loss
 
 
-@compiled(inline=True)
-def load_after(load_rad: float, since_s: float, time_constant_s: float) -> float:
-    """Return what is left of the load of the servos, in radians that they moved, after a time."""
-    return load_rad * math.exp(-since_s / time_constant_s)
-
-
 @dataclass(frozen=True)
 class SpeedAfterSteering(DiscrepancyTerm):
     """The vehicle is slower after its servos have moved: ``v ← v (1 − loss L)``, with ``L̇ = |δ̇_f| + |δ̇_r| − L / T``.
@@ -236,7 +230,7 @@ class SpeedAfterSteering(DiscrepancyTerm):
         """Add what both axles move to what is left of the load."""
         if loss_per_rad != 0.0:
             front, rear, now = state[FRONT_AIM], state[REAR_AIM], state[TIME]
-            state[STEERING_LOAD] = load_after(state[STEERING_LOAD], now - state[STEERING_LOAD_AT], time_constant_s)
+            state[STEERING_LOAD] = decayed(state[STEERING_LOAD], now - state[STEERING_LOAD_AT], time_constant_s)
             state[STEERING_LOAD] += abs(front - state[FRONT_MOVED_TO]) + abs(rear - state[REAR_MOVED_TO])
             state[FRONT_MOVED_TO], state[REAR_MOVED_TO], state[STEERING_LOAD_AT] = front, rear, now
 
@@ -244,7 +238,7 @@ class SpeedAfterSteering(DiscrepancyTerm):
     def drive(state: Floats, loss_per_rad: float, time_constant_s: float) -> None:
         """Slow both axles by what is left of the load."""
         if loss_per_rad != 0.0:
-            since_s = max(state[TIME] - state[STEERING_LOAD_AT], 0.0)
-            factor = 1.0 - loss_per_rad * load_after(state[STEERING_LOAD], since_s, time_constant_s)
+            since_s = state[TIME] - state[STEERING_LOAD_AT]
+            factor = 1.0 - loss_per_rad * decayed(state[STEERING_LOAD], since_s, time_constant_s)
             state[FRONT_SPEED] *= max(factor, 0.0)
             state[REAR_SPEED] *= max(factor, 0.0)

@@ -6,15 +6,15 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.diagnosis.terms.base import DiscrepancyTerm
+from agvbench.diagnosis.terms.base import DiscrepancyTerm, decayed
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
-    CREPT_AT,
+    CREEP_AT,
     DRIVE_START,
     FRONT,
     FRONT_AIM,
     FRONT_BEFORE,
-    FRONT_CREPT,
+    FRONT_CREEP,
     FRONT_HELD,
     FRONT_LAGS,
     FRONT_LAGS_AT,
@@ -22,7 +22,7 @@ from agvbench.effects.state import (
     REAR,
     REAR_AIM,
     REAR_BEFORE,
-    REAR_CREPT,
+    REAR_CREEP,
     REAR_HELD,
     REAR_LAGS,
     REAR_LAGS_AT,
@@ -195,17 +195,17 @@ class SteeringCreep(DiscrepancyTerm):
 
     @staticmethod
     def aim(state: Floats, gain: float, time_constant_s: float) -> None:
-        """Advance the slow angles to a new command."""
+        """Add the steps of both targets to the ways that are left."""
         if gain != 0.0:
-            left = math.exp(-max(state[TIME] - state[CREPT_AT], 0.0) / time_constant_s)
-            state[FRONT_CREPT] = state[FRONT_HELD] + (state[FRONT_CREPT] - state[FRONT_HELD]) * left
-            state[REAR_CREPT] = state[REAR_HELD] + (state[REAR_CREPT] - state[REAR_HELD]) * left
-            state[FRONT_HELD], state[REAR_HELD], state[CREPT_AT] = state[FRONT_AIM], state[REAR_AIM], state[TIME]
+            front, rear, since_s = state[FRONT_AIM], state[REAR_AIM], state[TIME] - state[CREEP_AT]
+            state[FRONT_CREEP] = decayed(state[FRONT_CREEP], since_s, time_constant_s) + front - state[FRONT_HELD]
+            state[REAR_CREEP] = decayed(state[REAR_CREEP], since_s, time_constant_s) + rear - state[REAR_HELD]
+            state[FRONT_HELD], state[REAR_HELD], state[CREEP_AT] = front, rear, state[TIME]
 
     @staticmethod
     def steer(state: Floats, gain: float, time_constant_s: float) -> None:
-        """Add a share of the way that the slow angles have left."""
+        """Add a share of the ways that are left."""
         if gain != 0.0:
-            left = gain * math.exp(-max(state[TIME] - state[CREPT_AT], 0.0) / time_constant_s)
-            state[FRONT] += left * (state[FRONT_HELD] - state[FRONT_CREPT])
-            state[REAR] += left * (state[REAR_HELD] - state[REAR_CREPT])
+            since_s = state[TIME] - state[CREEP_AT]
+            state[FRONT] += gain * decayed(state[FRONT_CREEP], since_s, time_constant_s)
+            state[REAR] += gain * decayed(state[REAR_CREEP], since_s, time_constant_s)

@@ -42,7 +42,6 @@ from agvbench.model.simulation.followers import (
     AXLE,
     FOLLOWER_SIZE,
     HALF_BACKLASH,
-    TOGETHER,
     follow,
     plan_follower,
     way_axle,
@@ -53,6 +52,7 @@ from agvbench.model.simulation.gaps import (
     GAP_SETTLED_S,
     GAP_SIZE,
     SHORTEST_S,
+    TOGETHER,
     gap_at,
     kink_s,
     plan_gap,
@@ -250,10 +250,11 @@ def actuate(plan: Floats, tau: float, state: Floats) -> None:
 @compiled(inner=True)
 def actuate_any_order(plan: Floats, tau: float, state: Floats) -> None:
     """Do as `actuate`, also for actuators of second order; separate, because branches would cost the others a tenth."""
-    if plan[_ORDER] == FIRST_ORDER:
+    order = plan[_ORDER]
+    if order == FIRST_ORDER:
         actuate(plan, tau, state)
     else:
-        state[FRONT], state[REAR] = way_axle(plan, _FRONT, plan[_ORDER], tau), way_axle(plan, _REAR, plan[_ORDER], tau)
+        state[FRONT], state[REAR] = way_axle(plan, _FRONT, order, tau), way_axle(plan, _REAR, order, tau)
     state[SPEED] = _speed_any_order(plan, tau)
 
 
@@ -262,24 +263,24 @@ def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
     """Put positions, rates and speed at `tau`, where another command takes effect, into `servos`."""
     servos[4], servos[8] = _speed_any_order(plan, tau), _windup(plan, tau)
     servos[10] = 0.0 if plan[_DRIVE_ORDER] == _PLAIN else way_at(plan, _RESPONSE, INERT, tau)[1]
-    if plan[_ORDER] == FIRST_ORDER:
+    order = plan[_ORDER]
+    if order == FIRST_ORDER:
         servos[0], servos[1] = _position(plan, _FRONT, tau), _position(plan, _REAR, tau)
         servos[2] = follow(plan, _FRONT, plan[_FRONT + AXLE], servos[0])
         servos[3] = follow(plan, _REAR, plan[_REAR + AXLE], servos[1])
         return
-    servos[0], servos[1] = way_position(plan, _FRONT, plan[_ORDER], tau), way_position(plan, _REAR, plan[_ORDER], tau)
-    servos[2], servos[3] = way_axle(plan, _FRONT, plan[_ORDER], tau), way_axle(plan, _REAR, plan[_ORDER], tau)
-    servos[6] = -way_at(plan, _FRONT, plan[_ORDER], tau)[1]
-    servos[7] = -way_at(plan, _REAR, plan[_ORDER], tau)[1]
+    servos[0], servos[1] = way_position(plan, _FRONT, order, tau), way_position(plan, _REAR, order, tau)
+    servos[2], servos[3] = way_axle(plan, _FRONT, order, tau), way_axle(plan, _REAR, order, tau)
+    servos[6], servos[7] = -way_at(plan, _FRONT, order, tau)[1], -way_at(plan, _REAR, order, tau)[1]
 
 
 @compiled(inner=True)
 def step_length(plan: Floats, tau: float, longest: float) -> float:
     """Return the length of a step from `tau`: at most to the next kink, and short while a lag is active."""
-    if plan[_ORDER] == FIRST_ORDER:
+    order = plan[_ORDER]
+    if order == FIRST_ORDER:
         step = within_gap(plan, _REAR, tau, within_gap(plan, _FRONT, tau, longest))
     else:
-        order = plan[_ORDER]
         step = within_way(plan, _REAR, order, tau, within_way(plan, _FRONT, order, tau, longest))
     if plan[_DRIVE_ORDER] != _PLAIN:
         step = max(SHORTEST_S, longest_step(plan, _RESPONSE, INERT, tau, step))

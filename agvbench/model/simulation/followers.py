@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation.gaps import RAMP_STEP_S, SHORTEST_S
+from agvbench.model.simulation.gaps import RAMP_STEP_S, SHORTEST_S, TOGETHER
 from agvbench.model.simulation.servos import INERT, SETTLED_S, TURNS_EVERY_S, TURNS_S, WAY_SIZE, longest_step, way_at
 from agvbench.types import Floats
 
@@ -19,8 +19,6 @@ from agvbench.types import Floats
 AIM, HALF_BACKLASH, AXLE, _TURN_S, _TAKES_S = range(WAY_SIZE, WAY_SIZE + 5)
 FOLLOWER_SIZE = WAY_SIZE + 5
 
-# How close to a kink counts as there [s].
-TOGETHER = 1e-12
 # Halvings of an interval in search of a kink.
 _BISECTIONS = 45
 

@@ -23,6 +23,8 @@ _SETTLED = 1e-7
 _FIRST_STEP, _STEP_GROWTH = 0.7, 0.25
 # The longest step while a servo or the drive ramps, and the shortest step of all [s].
 RAMP_STEP_S, SHORTEST_S = 0.1, 1e-6
+# How close to a kink, or to the next command, counts as there [s].
+TOGETHER = 1e-12
 
 
 @compiled(inner=True)

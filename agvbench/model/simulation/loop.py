@@ -23,7 +23,7 @@ from agvbench.effects.state import (
     BRAKING_LIMIT,
     COAST_RELAXATION,
     COAST_SPRING,
-    CREPT_AT,
+    CREEP_AT,
     DISTANCE,
     DRIVE_BACKLASH,
     DRIVE_COMMAND,
@@ -35,7 +35,7 @@ from agvbench.effects.state import (
     FRONT_BACKLASH,
     FRONT_BEFORE,
     FRONT_COMMAND,
-    FRONT_CREPT,
+    FRONT_CREEP,
     FRONT_HELD,
     FRONT_LAGS,
     FRONT_LAGS_AT,
@@ -49,7 +49,7 @@ from agvbench.effects.state import (
     REAR_BACKLASH,
     REAR_BEFORE,
     REAR_COMMAND,
-    REAR_CREPT,
+    REAR_CREEP,
     REAR_HELD,
     REAR_LAG_RATIO,
     REAR_LAGS,
@@ -79,6 +79,7 @@ from agvbench.effects.state import (
 from agvbench.model.compiled import compiled
 from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
 from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
+from agvbench.model.simulation.gaps import TOGETHER
 from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_ROLLED, START_SIZE, STARTED, TURN, WORK_SIZE
 from agvbench.model.simulation.level import drive_speed, front_correction, level_lift, limit_body, see_late
 from agvbench.model.simulation.stages import aim, arrive, capture
@@ -91,7 +92,6 @@ Integers = NDArray[np.int64]
 _FIRST_STEP_S, _TURN_PER_STEP = 0.08, 0.3
 # Limit of the yaw rate [rad/s]: invalid parameters must not make the loop endless.
 _FASTEST_TURN = 150.0
-_TOGETHER = 1e-12
 # Recent speed: averaged with weights that fall with this time constant [s].
 RECENT_SPEED_S = 0.5
 _STATE = 4
@@ -156,7 +156,7 @@ def _hold(
     tau, longest = 0.0, min(vehicle[LONGEST_STEP], _FIRST_STEP_S)
     while tau < duration and k < stop:
         length = step_length(plan, tau, longest)
-        is_last = length > duration - tau - _TOGETHER
+        is_last = length > duration - tau - TOGETHER
         if is_last:
             length = duration - tau
         take_step(s, p, plan, work, vehicle, begin, tau, length, start)
@@ -271,8 +271,8 @@ def _drive_run(
     s[FRONT_LAGS] = s[REAR_LAGS] = s[DRIVES] = 0.0
     s[FRONT_LAGS_AT], s[REAR_LAGS_AT] = settled[first, 0], settled[first, 1]
     s[FRONT_MOVED_TO], s[REAR_MOVED_TO] = settled[first, 0], settled[first, 1]
-    s[STEERING_LOAD] = s[STEERING_LOAD_AT] = s[CREPT_AT] = 0.0
-    s[FRONT_CREPT], s[REAR_CREPT] = s[FRONT_HELD], s[REAR_HELD] = settled[first, 0], settled[first, 1]
+    s[STEERING_LOAD] = s[STEERING_LOAD_AT] = s[FRONT_CREEP] = s[REAR_CREEP] = s[CREEP_AT] = 0.0
+    s[FRONT_HELD], s[REAR_HELD] = settled[first, 0], settled[first, 1]
     driven = front = rear = first
     while now < math.inf:
         _obey(s, p, commands, settled, driven, front, rear, lift, now)
