@@ -12,7 +12,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.splits import Split
 from agvbench.diagnosis.design.propose import with_next_experiment
 from agvbench.diagnosis.discrepancy.campaign_time import columns_by_campaign_time
-from agvbench.diagnosis.discrepancy.regression import steering_tangents
+from agvbench.diagnosis.discrepancy.command_history import command_history
 from agvbench.diagnosis.discrepancy.stability import stability_test
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.findings.effect_states import effect_states
@@ -181,8 +181,8 @@ def _with_changes(rest: list[Dependence], changes: list[Dependence], at: int, *,
 def _changes(batch: Batch, parameters: Floats, poses: Floats, seed: int) -> list[Dependence]:
     """Return on what repeats depend that were driven at different times or under other conditions."""
     rates = residual_rates(batch.readings, poses)
-    tangents = steering_tangents(batch, parameters, rates)
-    return stability_test(rates, columns_by_campaign_time(rates, tangents, batch.geometry), batch.readings, seed)
+    history = command_history(batch, parameters, rates)
+    return stability_test(rates, columns_by_campaign_time(rates, history, batch.geometry), batch.readings, seed)
 
 
 def _fit_provenance(selection: Selection, readings: Readings) -> dict[str, object]:

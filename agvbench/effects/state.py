@@ -71,6 +71,16 @@ STEERING_LOAD, STEERING_LOAD_AT, FRONT_MOVED_TO, REAR_MOVED_TO = range(63, 67)
 RIGHT_RATE_RATIO = 67
 # Creep of each axle: the way that it had left at the last command, its target since then, and that time [s].
 FRONT_CREEP, REAR_CREEP, FRONT_HELD, REAR_HELD, CREEP_AT = range(68, 73)
+# Dead band of each servo: the target that it obeys, and the command that led there.
+FRONT_KEPT, REAR_KEPT, FRONT_KEPT_AT, REAR_KEPT_AT = range(73, 77)
+# The side to which each linkage slipped last: −1, 0 or 1.
+FRONT_SLIPPED, REAR_SLIPPED = range(77, 79)
+# Heading at the start of the run.
+START_HEADING = 79
+# When the drive was last commanded to the other direction [s], and the direction: −1 or 1; 0 before a run.
+DRIVE_REVERSED, DRIVE_DIRECTION = range(80, 82)
+# The mean commanded speed of the last seconds [m/s], when that was known [s], and the commanded speed since then.
+DRIVE_LOAD, DRIVE_LOAD_AT, DRIVE_HELD = range(82, 85)
 # What the lab logged about the run, each column standardised; 0 where nothing was logged.
-LOGGED, LOGGED_COUNT = 73, 16
+LOGGED, LOGGED_COUNT = 85, 16
 SIZE = LOGGED + LOGGED_COUNT

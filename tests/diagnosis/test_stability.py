@@ -7,13 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from histories import history_of
 from tiny_vehicle import FRONT_M, HEADER, REAR_M, InMemory, Tiny, campaign_runs
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.data.readings import Readings, read_runs
 from agvbench.diagnosis.discrepancy.campaign_time import columns_by_campaign_time, complement, is_constant
-from agvbench.diagnosis.discrepancy.regression import REACHES_RAD, RECOVERIES_S, SteeringTangents
+from agvbench.diagnosis.discrepancy.command_history import CommandHistory
 from agvbench.diagnosis.discrepancy.screening import screen
 from agvbench.diagnosis.discrepancy.stability import stability_test
 from agvbench.diagnosis.residuals.body_rates import Rates
@@ -38,7 +39,7 @@ def readings(sessions: list[str | None] | None = None) -> Readings:
     return Readings(runs, np.zeros((RUNS, 1)), np.zeros((RUNS, 1, 3)), nothing, nothing, STARTED_H, GROUP, {})
 
 
-def drives(seed: int) -> tuple[Rates, SteeringTangents]:
+def drives(seed: int) -> tuple[Rates, CommandHistory]:
     """Return residual rates of runs that begin to turn, with errors of runs and of steps, and what steered."""
     rng = np.random.default_rng(seed)
     by_command = rng.uniform(-0.4, 0.4, (COMMANDS, 2))
@@ -67,23 +68,19 @@ def drives(seed: int) -> tuple[Rates, SteeringTangents]:
     value = rng.normal(0.0, 0.01, (RUNS, 3))[run] + rng.normal(0.0, 0.01, (RUNS * STEPS, 3))
     levels = np.column_stack([np.zeros(len(run)), GROUP[run], GROUP[run]]).astype(np.int64)
     rates = Rates(run, value, STEP_M * one, covariates, begin, end, np.tile(np.arange(STEPS), RUNS))
-    lags = np.zeros((len(run), 2, len(REACHES_RAD)))
-    loads = np.zeros((len(run), len(RECOVERIES_S)))
     # The axles were at neutral before.
-    return rates, SteeringTangents(
-        tangent, np.zeros_like(tangent), tangent, levels, lags, loads, np.stack([loads, loads], axis=1)
-    )
+    return rates, history_of(tangent, np.zeros_like(tangent), levels)
 
 
-def change_of(rates: Rates, tangents: SteeringTangents, of: Readings | None = None) -> Dependence | None:
-    found = stability_test(rates, columns_by_campaign_time(rates, tangents, GEOMETRY), of or readings(), 0)
+def change_of(rates: Rates, history: CommandHistory, of: Readings | None = None) -> Dependence | None:
+    found = stability_test(rates, columns_by_campaign_time(rates, history, GEOMETRY), of or readings(), 0)
     return found[0] if found else None
 
 
-def changed(rates: Rates, tangents: SteeringTangents, through: str, share: np.ndarray, size: float = 0.02) -> Rates:
+def changed(rates: Rates, history: CommandHistory, through: str, share: np.ndarray, size: float = 0.02) -> Rates:
     """Return the rates with a change of the quantity that is called `through`."""
     value = rates.value.copy()
-    for term, columns in columns_by_campaign_time(rates, tangents, GEOMETRY):
+    for term, columns in columns_by_campaign_time(rates, history, GEOMETRY):
         if term.name == through:
             for feature, column in columns.items():
                 value[:, feature] += size * share[rates.run] * column[:, 0]
@@ -99,43 +96,43 @@ TERMS = [term for term, _ in columns_by_campaign_time(*drives(0), GEOMETRY)]
 
 @pytest.mark.parametrize("name", [term.name for term in TERMS])
 def test_a_change_of_any_quantity_in_a_part_of_the_campaign_is_found(name):
-    rates, tangents = drives(1)
+    rates, history = drives(1)
     inside = ((STARTED_H > 0.5) & (STARTED_H < 0.9)).astype(np.float64)
-    found = change_of(changed(rates, tangents, name, inside), tangents)
+    found = change_of(changed(rates, history, name, inside), history)
     assert found is not None
     assert found.covariate == "campaign_time_h"
     assert found.p_value == pytest.approx(1.0 / 5000.0)
 
 
 def test_a_gain_that_fades_is_found_though_left_and_right_cancel():
-    rates, tangents = drives(2)
+    rates, history = drives(2)
     fade = -np.expm1(-STARTED_H / 0.5)
-    found = change_of(changed(rates, tangents, "steering_by_campaign_time", fade, 0.08), tangents)
+    found = change_of(changed(rates, history, "steering_by_campaign_time", fade, 0.08), history)
     assert found is not None
     assert found.feature == "steering"
 
 
 def test_what_depends_on_the_command_only_is_no_change():
-    rates, tangents = drives(3)
+    rates, history = drives(3)
     by_command = np.random.default_rng(0).normal(0.0, 0.2, COMMANDS)[GROUP]
     moved = dataclasses.replace(rates, value=rates.value + by_command[rates.run, None])
-    assert change_of(moved, tangents) is None
+    assert change_of(moved, history) is None
 
 
 def test_a_change_between_sessions_is_said_to_depend_on_the_session():
-    rates, tangents = drives(4)
+    rates, history = drives(4)
     sessions = ["monday" if GROUP[k] % 2 == k // COMMANDS % 2 else "tuesday" for k in range(RUNS)]
     tuesday = np.array([name == "tuesday" for name in sessions], dtype=np.float64)
-    found = change_of(changed(rates, tangents, "speed_by_campaign_time", tuesday), tangents, readings(sessions))
+    found = change_of(changed(rates, history, "speed_by_campaign_time", tuesday), history, readings(sessions))
     assert found is not None
     assert found.covariate == "session"
 
 
 @pytest.mark.parametrize("name", [term.name for term in TERMS])
 def test_a_part_of_the_campaign_is_found_between_the_right_runs(name):
-    rates, tangents = drives(5)
+    rates, history = drives(5)
     inside = ((STARTED_H > 0.5) & (STARTED_H < 0.9)).astype(np.float64)
-    (best, *_) = screen(changed(rates, tangents, name, inside, 0.05), tangents, GEOMETRY, GROUP, 0)
+    (best, *_) = screen(changed(rates, history, name, inside, 0.05), history, GEOMETRY, GROUP, 0)
     assert best.term.name == name
     begins_h, ends_h, time_constant_h = best.values[0][-3:]
     assert begins_h == pytest.approx(0.5, abs=0.02)

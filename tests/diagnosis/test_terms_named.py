@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from tiny_vehicle import Tiny
+from tiny_vehicle import InMemory, Tiny, campaign_runs
 
-from agvbench.diagnosis import Verdict, diagnose
+from agvbench.diagnosis import Diagnosis, Verdict, diagnose
 
 pytestmark = pytest.mark.slow
 
@@ -35,6 +35,32 @@ OUTSIDE = {
         {"gain": 0.15, "time_constant_s": 1.2},
         "history time_in_run_s",
     ),
+    "mixing": (
+        Tiny(mixing_rad_s_per_m=0.2),
+        "steering_by_velocity",
+        {"front_rad_s_per_m": 0.2, "rear_rad_s_per_m": 0.2},
+        "direction speed_mps",
+    ),
+    "saver": (Tiny(saver_slip_rad=0.05), "steering_slip", {"slip_rad": 0.05}, "history"),
+    "cable": (Tiny(windup=-0.03), "steering_by_turned_heading", {"front": -0.03, "rear": 0.0}, "turned_rad"),
+    "gyroscope": (
+        Tiny(gyro_s_per_m=0.5),
+        "steering_by_yaw_rate",
+        {"front_s_per_m": 0.5, "rear_s_per_m": 0.0},
+        "direction curvature_per_m speed_mps",
+    ),
+    "axle play": (
+        Tiny(axle_play_rad=0.03),
+        "steering_by_side_force",
+        {"rear_rad": 0.03, "front_rad": 0.0},
+        "curvature_per_m speed_mps",
+    ),
+    "supply": (
+        Tiny(supply_loss_s_per_m=0.8),
+        "speed_after_driving",
+        {"loss_s_per_m": 0.8, "time_constant_s": 1.5},
+        "history time_in_run_s",
+    ),
     "brake": (
         Tiny(brake_s=0.2, brake_turn_per_m=1.5),
         "turn_while_coasting",
@@ -47,7 +73,21 @@ OUTSIDE = {
 
 @pytest.mark.parametrize(("hidden", "term", "sizes", "covariates"), OUTSIDE.values(), ids=OUTSIDE)
 def test_a_cause_outside_the_library_is_described_by_its_term(tiny_campaign, hidden, term, sizes, covariates):
-    found = diagnose(tiny_campaign(hidden))
+    check_description(diagnose(tiny_campaign(hidden)), term, sizes, covariates)
+
+
+def test_small_steps_show_the_dead_band_of_a_servo():
+    found = diagnose(InMemory(campaign_runs(Tiny(dead_band=111.0), small_steps=True)))
+    check_description(found, "steering_dead_band", {"share": 1.0}, "history curvature_per_m")
+    assert 100.0 < found.provenance["empirical_term"]["parameters"]["width"] < 150.0
+
+
+def test_reversals_show_the_pause_of_a_speed_controller():
+    found = diagnose(InMemory(campaign_runs(Tiny(reversal_pause_s=0.3), reversals=True)))
+    check_description(found, "pause_at_reversal", {"pause_s": 0.3}, "history direction")
+
+
+def check_description(found: Diagnosis, term: str, sizes: dict[str, float], covariates: str) -> None:
     assert found.verdict is Verdict.UNKNOWN
     assert found.depends_on[0].covariate in covariates.split()
     empirical = found.provenance["empirical_term"]

@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 import pytest
+from histories import history_of
 from tiny_vehicle import FRONT_M, REAR_M, Tiny, campaign_runs
 
 from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import read_runs
-from agvbench.diagnosis.discrepancy.regression import REACHES_RAD, RECOVERIES_S, SteeringTangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, dependences
@@ -58,12 +58,7 @@ def drives(seed: int, *, variance_components: float = 0.01) -> Rates:
 
 def screened(rates: Rates) -> list[Start]:
     straight = np.zeros((len(rates.run), 2))
-    levels, lags = np.zeros((len(rates.run), 3), dtype=np.int64), np.zeros((len(rates.run), 2, len(REACHES_RAD)))
-    loads = np.zeros((len(rates.run), len(RECOVERIES_S)))
-    stands = SteeringTangents(
-        straight, straight, straight, levels, lags, loads, np.zeros((len(rates.run), 2, len(RECOVERIES_S)))
-    )
-    return screen(rates, stands, GEOMETRY, GROUP, 0)
+    return screen(rates, history_of(straight, straight), GEOMETRY, GROUP, 0)
 
 
 def test_chance_is_rarely_called_a_dependence():

@@ -91,6 +91,16 @@ class Tiny:
     step_creep: float = 0.0
     step_creep_s: float = 1.0
     sag_s: float = 0.6
+    mixing_rad_s_per_m: float = 0.0
+    dead_band: float = 0.0
+    saver_slip_rad: float = 0.0
+    saver_beyond: float = 150.0
+    windup: float = 0.0
+    gyro_s_per_m: float = 0.0
+    axle_play_rad: float = 0.0
+    supply_loss_s_per_m: float = 0.0
+    supply_s: float = 1.5
+    reversal_pause_s: float = 0.0
     brake_turn_per_m: float = 0.0
     seam_rad: float = 0.0
     downhill: float = 0.0
@@ -122,6 +132,37 @@ def rear_of(command: float) -> float:
     return min(max(-0.00153 * (command - NEUTRAL) - 0.037, -0.68), 0.69)
 
 
+class Electronics:
+    """What is between the commands and the actuators: dead bands, a linkage that slips, a supply, a controller."""
+
+    def __init__(self, tiny: Tiny) -> None:
+        self.tiny, self.kept, self.slipped = tiny, [NEUTRAL, NEUTRAL], [0.0, 0.0]
+        self.drawn, self.direction, self.paused_s = 0.0, 0.0, 0.0
+
+    def obey(self, command: Command, commanded: float) -> tuple[list[float], float]:
+        """Return the angles and the speed that the actuators aim at."""
+        return self._steer((command.front, command.rear), commanded), self._drive(commanded)
+
+    def _steer(self, commands: tuple[float, float], commanded: float) -> list[float]:
+        for axle, command in enumerate(commands):
+            if abs(command - self.kept[axle]) > self.tiny.dead_band:
+                self.kept[axle] = command
+            if abs(command - NEUTRAL) > self.tiny.saver_beyond:
+                self.slipped[axle] = math.copysign(self.tiny.saver_slip_rad, command - NEUTRAL)
+        angles = front_of(self.kept[0]), rear_of(self.kept[1])
+        mixed = self.tiny.mixing_rad_s_per_m * commanded
+        return [angle - slip + mixed for angle, slip in zip(angles, self.slipped, strict=True)]
+
+    def _drive(self, commanded: float) -> float:
+        self.drawn += (abs(commanded) - self.drawn) * _STEP_S / self.tiny.supply_s
+        reverses = commanded * self.direction < 0.0
+        self.paused_s = self.paused_s + _STEP_S if reverses else 0.0
+        if reverses and self.paused_s < self.tiny.reversal_pause_s:
+            return 0.0
+        self.direction = commanded or self.direction
+        return commanded * (1.0 - self.tiny.supply_loss_s_per_m * self.drawn)
+
+
 def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np.random.Generator) -> Frames:
     """Return 60 Hz frames of one run, from rest to rest."""
     f_off, r_off = rng.normal(0.0, tiny.axle_scatter_rad, 2)
@@ -136,6 +177,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     turning, loose, driven, windup, gap_m = [0.0, 0.0], [front, rear], 0.0, 0.0, 0.0
     strained, crept = [(front, 0.0), (rear, 0.0)], [front, rear]
     load, before_asked = 0.0, (front_of(NEUTRAL), rear_of(NEUTRAL))
+    electronics = Electronics(tiny)
     poses, times = [], []
     steps = round((commands.t_s[-1] + _AFTER_S + _BEFORE_S) / _STEP_S)
     for k in range(steps):
@@ -146,7 +188,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         row = int(np.searchsorted(commands.t_s, t - tiny.delay_s + 1e-12, side="right")) - 1
         c = commands.at(row) if row >= 0 else Command(NEUTRAL, NEUTRAL, NEUTRAL)
         commanded = speed_of(c.drive) * gain
-        asked = front_of(c.front), rear_of(c.rear)
+        asked, commanded = electronics.obey(c, commanded)
         load = load * math.exp(-_STEP_S / tiny.sag_s) + sum(map(abs, np.subtract(asked, before_asked)))
         before_asked = asked
         gap_m = tiny.drive_gap_m if commanded == 0.0 else gap_m - abs(commanded) * _STEP_S
@@ -155,13 +197,13 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         away = [1.0 - math.exp(-_STEP_S / lag) if lag else 1.0 for lag in lags]
         was = front, rear, speed
         if tiny.steering_inertia_s:
-            for axle, aim, at in ((0, front_of(c.front) + f_off, front), (1, rear_of(c.rear) + r_off, rear)):
+            for axle, aim, at in ((0, asked[0] + f_off, front), (1, asked[1] + r_off, rear)):
                 push = (aim - at - tiny.steering_lag_s * turning[axle]) / tiny.steering_inertia_s**2
                 turning[axle] += push * _STEP_S
             front, rear = front + turning[0] * _STEP_S, rear + turning[1] * _STEP_S
         else:
-            front += (front_of(c.front) + f_off - front) * away[0]
-            rear += (rear_of(c.rear) + r_off - rear) * away[1]
+            front += (asked[0] + f_off - front) * away[0]
+            rear += (asked[1] + r_off - rear) * away[1]
         lag = (
             tiny.accelerate_s
             if abs(commanded) > abs(speed)
@@ -189,6 +231,10 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
         f, r = (angle + tiny.step_creep * (angle - z) for z, angle in zip(crept, (f, r), strict=True))
         f += tiny.run_out_rad * math.sin(math.tau * driven / 0.8)
         f *= 1.0 + tiny.yields_s_per_m * (abs(s) - 0.2)
+        f += tiny.windup * (heading - start[2])
+        turns = s * (math.tan(f) - math.tan(r))
+        f -= tiny.gyro_s_per_m * turns / (1.0 + tiny.gyro_s_per_m * s)
+        r += tiny.axle_play_rad * math.tanh(s * turns / 0.01)
         df = (f + tiny.front_from_rear * r) * relief * warm * tiny.steering_factor + tiny.front_trim_rad
         dr = (r + tiny.rear_from_front * f) * relief * warm * tiny.steering_factor
         drag = tiny.cornering_loss * (abs(math.tan(df)) + abs(math.tan(dr)))
@@ -298,7 +344,14 @@ def switched(drive_us: float, fronts: list[float], rears: list[float], seconds: 
     )
 
 
-def experiments(*, steps: bool = True, rear_steps: bool = False) -> Iterator[tuple[str, Commands, int]]:
+def reversed_drive(front: float, rear: float, drives_us: list[float], seconds: float) -> Commands:
+    t = np.array([0.0, *(0.4 + seconds * np.arange(len(drives_us) + 1))])
+    return Commands(t, np.array([NEUTRAL, *drives_us, NEUTRAL]), np.full(len(t), front), np.full(len(t), rear))
+
+
+def experiments(  # noqa: PLR0912
+    *, steps: bool = True, rear_steps: bool = False, small_steps: bool = False, reversals: bool = False
+) -> Iterator[tuple[str, Commands, int]]:
     """Yield (experiment, commands, repeats) of a whole small campaign."""
     n = NEUTRAL
     levels = (1000.0, 1150.0, 1300.0, 1400.0, 1500.0, 1600.0, 1700.0, 1850.0, 2000.0)
@@ -324,21 +377,26 @@ def experiments(*, steps: bool = True, rear_steps: bool = False) -> Iterator[tup
     if rear_steps:
         for c in (900.0, 2100.0):
             yield "step", switched(c, [n] * 5, [1300.0, 1700.0, 1300.0, 1700.0, 1500.0], 1.2), 3
+    if small_steps:
+        for c in (900.0, 2100.0):
+            yield "small_step", switched(c, [1600.0, 1700.0, 1600.0, 1500.0, 1400.0, 1300.0], [n] * 6, 0.8), 3
+            yield "small_step", switched(c, [n] * 6, [1400.0, 1300.0, 1400.0, 1500.0, 1600.0, 1700.0], 0.8), 3
+    if reversals:
+        for front, rear in ((n, n), (1300.0, 1700.0), (1700.0, 1300.0)):
+            yield "reversal", reversed_drive(front, rear, [900.0, 2100.0, 900.0, 2100.0], 1.2), 3
 
 
-def campaign_runs(
-    tiny: Tiny, *, seed: int = 0, steps: bool = True, rear_steps: bool = False, hours: float = 1.0
-) -> list[Run]:
-    """Return a campaign: repeats interleaved, start poses at random."""
-    return list(_driven(tiny, seed, steps, rear_steps, hours))
+def campaign_runs(tiny: Tiny, *, seed: int = 0, hours: float = 1.0, **which: bool) -> list[Run]:
+    """Return a campaign of `experiments(**which)`: repeats interleaved, start poses at random."""
+    return list(_driven(tiny, seed, hours, tuple(sorted(which.items()))))
 
 
 @functools.cache
-def _driven(tiny: Tiny, seed: int, steps: bool, rear_steps: bool, hours: float) -> tuple[Run, ...]:
+def _driven(tiny: Tiny, seed: int, hours: float, which: tuple[tuple[str, bool], ...]) -> tuple[Run, ...]:
     rng = np.random.default_rng(seed)
     plan = [
         (name, commands, repeat, k)
-        for k, (name, commands, repeats) in enumerate(experiments(steps=steps, rear_steps=rear_steps))
+        for k, (name, commands, repeats) in enumerate(experiments(**dict(which)))
         for repeat in range(1, repeats + 1)
     ]
     plan.sort(key=lambda row: (row[2], rng.random()))

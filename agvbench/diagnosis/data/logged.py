@@ -20,7 +20,8 @@ from agvbench.types import Floats, Run, TimeSeries
 RUN_ORDER = "run_order"
 COMPUTED = frozenset({
     "x_m", "y_m", "heading_rad", "course_rad", "time_in_run_s", "campaign_time_h", "speed_mps", "direction",
-    "curvature_per_m", "sideslip", "distance_m", "distance_modulo_period_m", "history", "session", RUN_ORDER,
+    "curvature_per_m", "sideslip", "distance_m", "distance_modulo_period_m", "history", "turned_rad",
+    "session", RUN_ORDER,
 })  # fmt: skip
 """Covariates that every diagnosis has: a logged column of such a name would be taken for it."""
 

@@ -9,7 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from agvbench.diagnosis import terms
-from agvbench.diagnosis.discrepancy.regression import Columns, GroupedRegression, SteeringTangents
+from agvbench.diagnosis.discrepancy.command_history import CommandHistory
+from agvbench.diagnosis.discrepancy.regression import Columns, GroupedRegression
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import AT_ONCE_H, LATEST_H, LONGEST_H
@@ -149,20 +150,20 @@ def is_constant(values: Floats, hours: Floats) -> bool:
 
 
 def columns_by_campaign_time(
-    rates: Rates, tangents: SteeringTangents, geometry: Geometry
+    rates: Rates, history: CommandHistory, geometry: Geometry
 ) -> Iterator[tuple[type[DiscrepancyTerm], Columns]]:
     """Yield each term with what its full change adds to the residual rates, a column per parameter of the change."""
     c = rates.covariates
     one, zero, curvature = np.ones(len(rates.run)), np.zeros(len(rates.run)), c["curvature_per_m"]
     yield terms.SpeedByCampaignTime, {0: one[:, None]}
-    steering = by_steering_gain(rates, tangents, geometry)
+    steering = by_steering_gain(rates, history, geometry)
     yield terms.SteeringByCampaignTime, steering
     late_steering: Columns = {}
     if geometry.is_differential:
         yield terms.WheelsByCampaignTime, {0: one[:, None]} | steering
     else:
-        yield terms.TrimByCampaignTime, by_axle_angles(one, one, tangents, geometry)
-        late_steering = _by_steering_lag(rates, tangents, geometry)
+        yield terms.TrimByCampaignTime, by_axle_angles(one, one, history, geometry)
+        late_steering = _by_steering_lag(rates, history, geometry)
         yield terms.SteeringLagByCampaignTime, late_steering
     heading = 0.5 * (rates.begin + rates.end)[:, 2]
     cos, sin = (c["direction"] / c["speed_mps"] * of(heading) for of in (np.cos, np.sin))
@@ -178,42 +179,42 @@ def columns_by_campaign_time(
     yield terms.SpeedLagByCampaignTime, {0: gained}
 
 
-def by_steering_gain(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Columns:
+def by_steering_gain(rates: Rates, history: CommandHistory, geometry: Geometry) -> Columns:
     """Return the lateral and curvature residuals by a share of both axle angles, or of a differential's yaw rate."""
     if geometry.is_differential:
         curvature = rates.covariates["curvature_per_m"][:, None]
         return {1: geometry.rear_axle_m * curvature, 2: curvature}
-    return by_both_axles(np.arctan(tangents.tangent), tangents, geometry)
+    return by_both_axles(np.arctan(history.tangent), history, geometry)
 
 
-def _by_steering_lag(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Columns:
+def _by_steering_lag(rates: Rates, history: CommandHistory, geometry: Geometry) -> Columns:
     """Return the lateral and curvature residuals by a lag of the servos [s], which acts after their commands."""
-    changed = np.any(np.diff(tangents.levels[:, 1:], axis=0) != 0, axis=1) | (np.diff(rates.run) != 0)
+    changed = np.any(np.diff(history.levels[:, 1:], axis=0) != 0, axis=1) | (np.diff(rates.run) != 0)
     lost = np.r_[True, changed] * rates.covariates["speed_mps"] / rates.weight
-    missing = (np.arctan(tangents.previous) - np.arctan(tangents.tangent)) * lost[:, None]
-    return by_both_axles(missing, tangents, geometry)
+    missing = (np.arctan(history.previous) - np.arctan(history.tangent)) * lost[:, None]
+    return by_both_axles(missing, history, geometry)
 
 
-def by_both_axles(change: Floats, tangents: SteeringTangents, geometry: Geometry) -> Columns:
+def by_both_axles(change: Floats, history: CommandHistory, geometry: Geometry) -> Columns:
     """Return the lateral and curvature residuals by changes of both axle angles (n, 2) [rad] at once, one column."""
-    by_axle = by_axle_angles(change[:, 0], change[:, 1], tangents, geometry)
+    by_axle = by_axle_angles(change[:, 0], change[:, 1], history, geometry)
     return {k: columns.sum(axis=1, keepdims=True) for k, columns in by_axle.items()}
 
 
-def by_axle_angles(front: Floats, rear: Floats, tangents: SteeringTangents, geometry: Geometry) -> Columns:
+def by_axle_angles(front: Floats, rear: Floats, history: CommandHistory, geometry: Geometry) -> Columns:
     """Return the lateral and curvature residuals by changes of the axle angles [rad], a column per axle."""
-    slope = 1.0 + tangents.tangent**2
+    slope = 1.0 + history.tangent**2
     f, r = front * slope[:, 0], rear * slope[:, 1]
     lf, lr, base = geometry.front_axle_m, geometry.rear_axle_m, geometry.wheelbase_m
     return {1: np.column_stack([lr * f, lf * r]) / base, 2: np.column_stack([f, -r]) / base}
 
 
 def changes(
-    rates: Rates, tangents: SteeringTangents, geometry: Geometry, regression: GroupedRegression
+    rates: Rates, history: CommandHistory, geometry: Geometry, regression: GroupedRegression
 ) -> Iterator[tuple[type[DiscrepancyTerm], Columns, Course]]:
     """Yield each term that depends on campaign time with the best course of each kind, and its regressors."""
     hours = rates.covariates["campaign_time_h"]
-    for term, columns in columns_by_campaign_time(rates, tangents, geometry):
+    for term, columns in columns_by_campaign_time(rates, history, geometry):
 
         def over_time(course: Course, columns: Columns = columns) -> Columns:
             return {k: course.share[:, None] * c for k, c in columns.items()}

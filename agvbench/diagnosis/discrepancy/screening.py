@@ -23,14 +23,15 @@ from agvbench.diagnosis.discrepancy.campaign_time import (
     changes,
     columns_by_campaign_time,
 )
-from agvbench.diagnosis.discrepancy.regression import (
-    FOLDS,
+from agvbench.diagnosis.discrepancy.command_history import (
+    DEAD_BANDS,
+    LOADS_S,
     REACHES_RAD,
     RECOVERIES_S,
-    Columns,
-    GroupedRegression,
-    SteeringTangents,
+    SLIPS_BEYOND,
+    CommandHistory,
 )
+from agvbench.diagnosis.discrepancy.regression import FOLDS, Columns, GroupedRegression
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms import DiscrepancyTerm
 from agvbench.diagnosis.terms.speed import angle_beyond
@@ -48,6 +49,9 @@ _POINT_STEP, _CORES_M = 12, (0.1, 0.5, 2.0)
 _RUN_TIMES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
 _FROM_RAD, _ANGLE_REACHES_RAD = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5), (0.03, 0.2, 1.0)
 _COASTS_S = 0.2
+_CABLE_STEPS, _SLACKS_M = 9, (0.0, 0.3, 0.7, 1.2)
+_FORCES = (0.01, 0.03, 0.1, 0.3, 1.0)
+_PAUSES_S, _LEAST_LOST = (0.1, 0.2, 0.4), 0.05
 _WAVES_M = np.geomspace(0.12, 1.5, 50)
 
 Option = tuple[Columns, Callable[[Floats], list[float]]]
@@ -78,13 +82,18 @@ class _Travel(Values):
         return [half_width, 2.0 * half_width / reach]
 
 
+class _Pause(Values):
+    def __call__(self, coefficients: Floats) -> list[float]:
+        return [max(float(coefficients[0]), 0.0) * self.fixed[0]]
+
+
 class _Wave(Values):
     def __call__(self, coefficients: Floats) -> list[float]:
         return [*self.fixed, *coefficients.tolist()]
 
 
 def options(
-    rates: Rates, tangents: SteeringTangents, geometry: Geometry, regression: GroupedRegression
+    rates: Rates, history: CommandHistory, geometry: Geometry, regression: GroupedRegression
 ) -> Iterator[tuple[type[terms.DiscrepancyTerm], Iterator[Option]]]:
     """Yield each term with its shapes: regressors, and the function that composes parameters."""
     c = rates.covariates
@@ -93,6 +102,7 @@ def options(
     yield terms.SpeedInStrip, _strips(rates)
     yield terms.TurnAtLine, _lines(rates, regression)
     yield terms.BentPicture, _pictures(rates)
+    yield terms.SkewedPicture, iter([(_skews(rates), Values())])
     yield terms.SpeedByHeading, iter([({0: sine}, Values())])
     course = np.column_stack([np.cos(c["course_rad"]), np.sin(c["course_rad"])])
     yield terms.SpeedByCourse, iter([({0: course}, Values())])
@@ -100,40 +110,52 @@ def options(
     yield terms.SlipByYawRate, iter([(_slips(rates), Values())])
     yield terms.DriftToPoint, _points(rates)
     yield terms.DriftByPlace, iter([(_drifts(rates, _quadratic(rates.middle)), Values())])
+    yield terms.PullOfCable, _cables(rates)
     yield terms.SpeedByRunTime, _run_times(rates)
-    yield terms.SteeringAtStart, _starts_of_steering(rates, tangents, geometry)
+    yield terms.SpeedAfterDriving, _drive_loads(history)
+    yield terms.PauseAtReversal, _pauses(history)
+    yield terms.SteeringAtStart, _starts_of_steering(rates, history, geometry)
     yield terms.TwistAtStart, _starts(rates)
     yield terms.TurnWhileCoasting, iter([(_stops(rates), Values())])
-    for term, columns, change in changes(rates, tangents, geometry, regression):
+    for term, columns, change in changes(rates, history, geometry, regression):
         yield term, iter([(columns, change.values)])
-    yield from _logged(rates, tangents, geometry)
+    yield from _logged(rates, history, geometry)
     if geometry.is_differential:
         direction = c["direction"][:, None]
         columns = {1: geometry.rear_axle_m * direction, 2: direction}
         yield terms.TurnByDirection, iter([(columns, Values())])
     else:
-        yield from _steering(rates, tangents, geometry)
+        yield from _steering(rates, history, geometry, regression)
     yield terms.WaveByDistance, _waves(rates)
 
 
 def _steering(
-    rates: Rates, tangents: SteeringTangents, geometry: Geometry
+    rates: Rates, history: CommandHistory, geometry: Geometry, regression: GroupedRegression
 ) -> Iterator[tuple[type[DiscrepancyTerm], Iterator[Option]]]:
     """Yield the terms of steered axles: by direction of travel, and by what was steered before."""
     direction = rates.covariates["direction"]
-    yield terms.SteeringByDirection, iter([(by_axle_angles(direction, direction, tangents, geometry), Values())])
-    angles = np.arctan(tangents.tangent)
+    yield terms.SteeringByDirection, iter([(by_axle_angles(direction, direction, history, geometry), Values())])
+    velocity = direction * rates.covariates["speed_mps"]
+    yield terms.SteeringByVelocity, iter([(by_axle_angles(velocity, velocity, history, geometry), Values())])
+    angles = np.arctan(history.tangent)
     faster = (rates.covariates["speed_mps"] - TYPICAL_MPS)[:, None] * angles
-    yield terms.SteeringBySpeed, iter([(by_axle_angles(faster[:, 0], faster[:, 1], tangents, geometry), Values())])
+    yield terms.SteeringBySpeed, iter([(by_axle_angles(faster[:, 0], faster[:, 1], history, geometry), Values())])
+    turns = velocity * (history.tangent[:, 0] - history.tangent[:, 1])
+    yield terms.SteeringByYawRate, iter([(by_axle_angles(-turns, -turns, history, geometry), Values())])
+    yield terms.SteeringBySideForce, _side_forces(velocity * turns, history, geometry)
+    turned = _turned(rates)
+    yield terms.SteeringByTurnedHeading, iter([(by_axle_angles(turned, turned, history, geometry), Values())])
     yield terms.SpeedBySteering, _rubbing(angles)
-    yield terms.SpeedAfterSteering, _loads(tangents)
-    turned = [np.arctan(before) - angles for before in (tangents.previous, tangents.reversal)]
-    if np.any(turned[0] != 0.0):
-        both = [by_both_axles(angle, tangents, geometry) for angle in turned]
+    yield terms.SpeedAfterSteering, _loads(history)
+    changes_back = [np.arctan(before) - angles for before in (history.previous, history.reversal)]
+    if np.any(changes_back[0] != 0.0):
+        both = [by_both_axles(angle, history, geometry) for angle in changes_back]
         columns = {k: np.hstack([shares[k] for shares in both]) for k in both[0]}
         yield terms.SteeringByHistory, iter([(columns, Values())])
-        yield terms.SteeringByTravel, _travels(tangents, geometry)
-        yield terms.SteeringCreep, _creeps(tangents, geometry)
+        yield terms.SteeringByTravel, _travels(history, geometry)
+        yield terms.SteeringCreep, _creeps(history, geometry)
+        yield terms.SteeringDeadBand, _dead_bands(history, geometry)
+        yield terms.SteeringSlip, _slips_of_linkage(history, geometry, regression)
 
 
 def _rubbing(angles: Floats) -> Iterator[Option]:
@@ -146,20 +168,67 @@ def _rubbing(angles: Floats) -> Iterator[Option]:
                 yield {0: losses}, Values(begin, reach)
 
 
-def _loads(tangents: SteeringTangents) -> Iterator[Option]:
+def _loads(history: CommandHistory) -> Iterator[Option]:
     for number, constant in enumerate(RECOVERIES_S):
-        if np.any(tangents.loads[:, number] > 0.0):
-            yield {0: -tangents.loads[:, [number]]}, Values(constant)
+        if np.any(history.loads[:, number] > 0.0):
+            yield {0: -history.loads[:, [number]]}, Values(constant)
 
 
-def _creeps(tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
+def _creeps(history: CommandHistory, geometry: Geometry) -> Iterator[Option]:
     for number, constant in enumerate(RECOVERIES_S):
-        yield by_both_axles(tangents.creeps[:, :, number], tangents, geometry), Values(constant)
+        yield by_both_axles(history.creeps[:, :, number], history, geometry), Values(constant)
 
 
-def _travels(tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
+def _dead_bands(history: CommandHistory, geometry: Geometry) -> Iterator[Option]:
+    for number, band in enumerate(DEAD_BANDS):
+        yield by_both_axles(history.kept[:, :, number], history, geometry), Values(band * history.reach)
+
+
+def _slips_of_linkage(history: CommandHistory, geometry: Geometry, regression: GroupedRegression) -> Iterator[Option]:
+    """Yield slips beyond the same distance to either side of neutral, then beyond another one on one side."""
+
+    def option(above: int, below: int) -> Option:
+        side = np.sign(history.above[:, :, above] - history.below[:, :, below])
+        values = Values(SLIPS_BEYOND[above] * history.reach, SLIPS_BEYOND[below] * history.reach)
+        return by_both_axles(-side, history, geometry), values
+
+    every = range(len(SLIPS_BEYOND))
+    gains = [regression.gain(option(k, k)[0])[0] for k in every]
+    best = int(np.argmax(gains))
+    for k in every:
+        yield option(k, best)
+        yield option(best, k)
+
+
+def _side_forces(force: Floats, history: CommandHistory, geometry: Geometry) -> Iterator[Option]:
+    for reach in _FORCES:
+        share = np.tanh(force / reach)
+        yield by_axle_angles(share, share, history, geometry), Values(reach)
+
+
+def _turned(rates: Rates) -> Floats:
+    """Return the heading turned since the start of the run, at each rate (n,)."""
+    heading = 0.5 * (rates.begin[:, 2] + rates.end[:, 2])
+    first = np.flatnonzero(np.r_[True, np.diff(rates.run) != 0])
+    return np.asarray(heading - np.repeat(rates.begin[first, 2], np.diff(np.r_[first, len(heading)])))
+
+
+def _drive_loads(history: CommandHistory) -> Iterator[Option]:
+    for number, constant in enumerate(LOADS_S):
+        yield {0: -history.drive_load[:, [number]]}, Values(constant)
+
+
+def _pauses(history: CommandHistory) -> Iterator[Option]:
+    """Yield losses of speed after a reversal; the pause is the product of their size and their duration."""
+    for constant in _PAUSES_S:
+        lost = np.exp(-history.reversed_s / constant)
+        if np.any(lost > _LEAST_LOST):
+            yield {0: -lost[:, None]}, _Pause(constant)
+
+
+def _travels(history: CommandHistory, geometry: Geometry) -> Iterator[Option]:
     for number, reach in enumerate(REACHES_RAD):
-        yield by_both_axles(-tangents.lags[:, :, number], tangents, geometry), _Travel(reach)
+        yield by_both_axles(-history.lags[:, :, number], history, geometry), _Travel(reach)
 
 
 _BY_LOGGED_COLUMN: dict[type[DiscrepancyTerm], type[terms.ByLoggedColumn]] = {
@@ -170,12 +239,12 @@ _BY_LOGGED_COLUMN: dict[type[DiscrepancyTerm], type[terms.ByLoggedColumn]] = {
 
 
 def _logged(
-    rates: Rates, tangents: SteeringTangents, geometry: Geometry
+    rates: Rates, history: CommandHistory, geometry: Geometry
 ) -> Iterator[tuple[type[terms.DiscrepancyTerm], Iterator[Option]]]:
     """Yield the terms of logged columns: the regressors of a change with time, in proportion to each column."""
     if not rates.standardised.shape[1]:
         return
-    for of_time, columns in columns_by_campaign_time(rates, tangents, geometry):
+    for of_time, columns in columns_by_campaign_time(rates, history, geometry):
         if of_time in _BY_LOGGED_COLUMN:
             yield _BY_LOGGED_COLUMN[of_time], _in_proportion(columns, rates.standardised)
 
@@ -191,8 +260,8 @@ def _run_times(rates: Rates) -> Iterator[Option]:
         yield {0: column[:, None]}, Values(constant)
 
 
-def _starts_of_steering(rates: Rates, tangents: SteeringTangents, geometry: Geometry) -> Iterator[Option]:
-    gain = by_steering_gain(rates, tangents, geometry)
+def _starts_of_steering(rates: Rates, history: CommandHistory, geometry: Geometry) -> Iterator[Option]:
+    gain = by_steering_gain(rates, history, geometry)
     for constant in _RUN_TIMES_S:
         loss = rates.covariates["speed_mps"] * np.exp(-rates.covariates["time_in_run_s"] / constant)
         yield {k: -loss[:, None] * column for k, column in gain.items()}, Values(constant)
@@ -263,6 +332,28 @@ def _points(rates: Rates) -> Iterator[Option]:
             for core in _CORES_M:
                 towards = way / np.sqrt(np.sum(way * way, axis=1, keepdims=True) + core * core)
                 yield _drifts(rates, towards[:, :, None]), Values(float(x), float(y), core)
+
+
+def _cables(rates: Rates) -> Iterator[Option]:
+    heading = 0.5 * (rates.begin[:, 2] + rates.end[:, 2])
+    along = np.column_stack([np.cos(heading), np.sin(heading)])
+    along *= (rates.covariates["direction"] / rates.covariates["speed_mps"])[:, None]
+    low, high = (f(rates.middle, axis=0) for f in (np.min, np.max))
+    for x in np.linspace(low[0], high[0], _CABLE_STEPS):
+        for y in np.linspace(low[1], high[1], _CABLE_STEPS):
+            away = rates.middle - np.array([x, y])
+            distance = np.hypot(*away.T) + 1e-9
+            outward = np.sum(away * along, axis=1) / distance
+            for slack in _SLACKS_M:
+                yield {0: (-np.maximum(distance - slack, 0.0) * outward)[:, None]}, Values(float(x), float(y), slack)
+
+
+def _skews(rates: Rates) -> Columns:
+    """Return the regressors of a skew and of a stretch of the position."""
+    moved = rates.end - rates.begin
+    heading = 0.5 * (rates.begin[:, 2] + rates.end[:, 2])
+    displaced = np.column_stack([moved[:, 1], moved[:, 0]]) * (rates.covariates["direction"] / rates.weight)[:, None]
+    return {0: displaced * np.cos(heading)[:, None], 1: -displaced * np.sin(heading)[:, None]}
 
 
 def _quadratic(place: Floats) -> Floats:
@@ -367,12 +458,12 @@ class Start:
 
 
 def screen(
-    rates: Rates, tangents: SteeringTangents, geometry: Geometry, group: NDArray[np.int64], seed: int
+    rates: Rates, history: CommandHistory, geometry: Geometry, group: NDArray[np.int64], seed: int
 ) -> list[Start]:
     """Return the best start of each term with a predicted gain, the largest gain first."""
-    regression = GroupedRegression(rates, tangents, folds(group, FOLDS, seed)[rates.run])
+    regression = GroupedRegression(rates, history, folds(group, FOLDS, seed)[rates.run])
     found: dict[type[DiscrepancyTerm], Start] = {}
-    for term, shapes in options(rates, tangents, geometry, regression):
+    for term, shapes in options(rates, history, geometry, regression):
         best: Start | None = None
         for columns, values in shapes:
             gain, coefficients = regression.gain(columns)

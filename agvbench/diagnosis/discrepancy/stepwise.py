@@ -10,8 +10,8 @@ import numpy as np
 
 from agvbench.diagnosis.criteria import DISCREPANCY, FIT, SELECTION
 from agvbench.diagnosis.discrepancy.campaign_time import complement, is_constant
+from agvbench.diagnosis.discrepancy.command_history import command_history
 from agvbench.diagnosis.discrepancy.other_forms import models_of_other_forms, with_other_forms
-from agvbench.diagnosis.discrepancy.regression import steering_tangents
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
@@ -255,8 +255,8 @@ def screened_terms(extended: Selector, root: ScoredModel) -> list[Start]:
     batch = extended.batch
     poses = root.fit.predictor.predict(root.fit.parameters)
     rates = residual_rates(batch.readings, poses)
-    tangents = steering_tangents(batch, root.fit.parameters, rates)
-    starts = screen(rates, tangents, batch.geometry, batch.readings.group, extended.seed)
+    history = command_history(batch, root.fit.parameters, rates)
+    starts = screen(rates, history, batch.geometry, batch.readings.group, extended.seed)
     least = max(DISCREPANCY.min_predicted_gain, DISCREPANCY.min_share_of_best_start * starts[0].gain) if starts else 0.0
     return [start for start in starts if start.gain > least][: DISCREPANCY.max_starts]
 

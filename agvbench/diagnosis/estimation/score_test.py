@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,10 +54,14 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
     """Return the predicted reduction of the loss by one more effect, to first order, its parameters near `start` (q,).
 
     `larger` has the effects of `fitted` and then the new one. It is linearised at `start`. The derivatives by the
-    existing parameters are those of `fitted`, so that a few simulations replace a fit.
+    existing parameters are those of `fitted`, so that a few simulations replace a fit. What cannot be evaluated at
+    `start` gains −∞.
     """
     parameters = initial_parameters(fitted, larger, start)
     poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start), fitted.linear.poses)
+    seen = larger.readings.seen
+    if not (np.isfinite(poses[seen]).all() and np.isfinite(slopes[seen]).all()):
+        return -math.inf
     residual = residual_of(larger, poses)
     prior = larger.prior(parameters)
     if larger.readings.initial_states is None:

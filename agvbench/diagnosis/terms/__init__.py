@@ -6,7 +6,7 @@ has few parameters, and therefore predicts runs that it was not fitted to.
 """
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
-from agvbench.diagnosis.terms.camera import BentPicture
+from agvbench.diagnosis.terms.camera import BentPicture, SkewedPicture
 from agvbench.diagnosis.terms.campaign_time import (
     ClockByCampaignTime,
     DriftByCampaignTime,
@@ -18,7 +18,7 @@ from agvbench.diagnosis.terms.campaign_time import (
     TrimByCampaignTime,
     WheelsByCampaignTime,
 )
-from agvbench.diagnosis.terms.floor import DriftByPlace, DriftToPoint
+from agvbench.diagnosis.terms.floor import DriftByPlace, DriftToPoint, PullOfCable
 from agvbench.diagnosis.terms.logged import (
     ByLoggedColumn,
     SpeedByLoggedColumn,
@@ -26,6 +26,8 @@ from agvbench.diagnosis.terms.logged import (
     TrimByLoggedColumn,
 )
 from agvbench.diagnosis.terms.speed import (
+    PauseAtReversal,
+    SpeedAfterDriving,
     SpeedAfterSteering,
     SpeedByCourse,
     SpeedByHeading,
@@ -37,10 +39,18 @@ from agvbench.diagnosis.terms.speed import (
 from agvbench.diagnosis.terms.steering import (
     SteeringAtStart,
     SteeringByDirection,
-    SteeringByHistory,
+    SteeringBySideForce,
     SteeringBySpeed,
+    SteeringByTurnedHeading,
+    SteeringByVelocity,
+    SteeringByYawRate,
+)
+from agvbench.diagnosis.terms.steering_history import (
+    SteeringByHistory,
     SteeringByTravel,
     SteeringCreep,
+    SteeringDeadBand,
+    SteeringSlip,
 )
 from agvbench.diagnosis.terms.turning import (
     SlipByYawRate,
@@ -57,15 +67,19 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SpeedInStrip,
     TurnAtLine,
     BentPicture,
+    SkewedPicture,
     SpeedByHeading,
     SpeedByCourse,
     TurnByHeading,
     SlipByYawRate,
     DriftToPoint,
     DriftByPlace,
+    PullOfCable,
     SpeedByRunTime,
     SpeedBySteering,
     SpeedAfterSteering,
+    SpeedAfterDriving,
+    PauseAtReversal,
     SteeringAtStart,
     TwistAtStart,
     TurnWhileCoasting,
@@ -82,10 +96,16 @@ TERMS: tuple[type[DiscrepancyTerm], ...] = (
     SteeringByLoggedColumn,
     TrimByLoggedColumn,
     SteeringByDirection,
+    SteeringByVelocity,
     SteeringBySpeed,
+    SteeringByYawRate,
+    SteeringBySideForce,
+    SteeringByTurnedHeading,
     SteeringByHistory,
     SteeringByTravel,
     SteeringCreep,
+    SteeringDeadBand,
+    SteeringSlip,
     WaveByDistance,
     TurnByDirection,
 )
@@ -101,7 +121,11 @@ __all__ = [
     "DriftByPlace",
     "DriftToPoint",
     "MarkersByCampaignTime",
+    "PauseAtReversal",
+    "PullOfCable",
+    "SkewedPicture",
     "SlipByYawRate",
+    "SpeedAfterDriving",
     "SpeedAfterSteering",
     "SpeedByCampaignTime",
     "SpeedByCourse",
@@ -117,10 +141,16 @@ __all__ = [
     "SteeringByDirection",
     "SteeringByHistory",
     "SteeringByLoggedColumn",
+    "SteeringBySideForce",
     "SteeringBySpeed",
     "SteeringByTravel",
+    "SteeringByTurnedHeading",
+    "SteeringByVelocity",
+    "SteeringByYawRate",
     "SteeringCreep",
+    "SteeringDeadBand",
     "SteeringLagByCampaignTime",
+    "SteeringSlip",
     "TrimByCampaignTime",
     "TrimByLoggedColumn",
     "TurnAtLine",

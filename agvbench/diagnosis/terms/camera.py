@@ -31,3 +31,24 @@ class BentPicture(DiscrepancyTerm):
         bend = per_m2 * (x * x + y * y)
         state[SEEN_X] += bend * x
         state[SEEN_Y] += bend * y
+
+
+@dataclass(frozen=True)
+class SkewedPicture(DiscrepancyTerm):
+    """The cameras' axes are not at right angles, or have scales of their own: ``x ← x (1 + stretch) + skew y``.
+
+    The heading remains, as that of a rigid body whose markers lie in all directions.
+    """
+
+    name: ClassVar[str] = "skewed_picture"
+    stage: ClassVar[Stage] = Stage.CAMERA
+    covariates: ClassVar[tuple[str, ...]] = ("course_rad", "heading_rad")
+    through: ClassVar[str] = "camera"
+
+    skew: float = parameter(unit="–", low=-0.3, high=0.3, scale=0.01)
+    stretch: float = parameter(unit="–", low=-0.3, high=0.3, scale=0.01)
+
+    @staticmethod
+    def see(state: Floats, skew: float, stretch: float) -> None:
+        """Displace the measured position along x."""
+        state[SEEN_X] += stretch * state[SEEN_X] + skew * state[SEEN_Y]

@@ -8,7 +8,18 @@ from typing import Any, ClassVar
 
 from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
-from agvbench.effects.state import FORWARD, LEFT, X_RATE, Y_RATE, X, Y
+from agvbench.effects.state import (
+    FORWARD,
+    FRONT_SPEED,
+    HEADING,
+    LEFT,
+    REAR_SPEED,
+    SPEED,
+    X_RATE,
+    Y_RATE,
+    X,
+    Y,
+)
 from agvbench.types import Floats
 
 _FIELD_STEP_S = 0.1
@@ -99,3 +110,33 @@ class DriftByPlace(DiscrepancyTerm):
             across = y + y_x * east + y_y * north + y_xx * east * east + y_xy * east * north + y_yy * north * north
             state[X_RATE] += moving * along
             state[Y_RATE] += moving * across
+
+
+@dataclass(frozen=True)
+class PullOfCable(DiscrepancyTerm):
+    """A cable to a point brakes on the way out and helps on the way in: ``v ← v − slope max(d − slack, 0) cos α``.
+
+    The distance to the point is d, and α is the angle between the heading and the direction away from it.
+    """
+
+    name: ClassVar[str] = "pull_of_cable"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("x_m", "y_m", "course_rad")
+    through: ClassVar[str] = "speed"
+    longest_step_s: ClassVar[float] = _FIELD_STEP_S
+
+    per_s: float = parameter(unit="1/s", low=-1.0, high=1.0, scale=0.05)
+    x_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    y_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    slack_m: float = parameter(unit="m", low=0.0, high=20.0, scale=0.3)
+
+    @staticmethod
+    def drive(state: Floats, per_s: float, x_m: float, y_m: float, slack_m: float) -> None:
+        """Change the speed of both axles while the drive turns."""
+        if per_s != 0.0 and state[SPEED] != 0.0:
+            away_x, away_y = state[X] - x_m, state[Y] - y_m
+            distance = math.hypot(away_x, away_y) + 1e-6
+            outward = (away_x * math.cos(state[HEADING]) + away_y * math.sin(state[HEADING])) / distance
+            pull = per_s * max(distance - slack_m, 0.0) * outward
+            state[FRONT_SPEED] -= pull
+            state[REAR_SPEED] -= pull

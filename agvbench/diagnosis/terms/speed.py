@@ -9,6 +9,10 @@ from typing import ClassVar
 from agvbench.diagnosis.terms.base import DiscrepancyTerm, decayed
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
+    DRIVE_HELD,
+    DRIVE_LOAD,
+    DRIVE_LOAD_AT,
+    DRIVE_REVERSED,
     FORWARD,
     FRONT,
     FRONT_AIM,
@@ -20,6 +24,7 @@ from agvbench.effects.state import (
     REAR_AIM,
     REAR_MOVED_TO,
     REAR_SPEED,
+    SPEED_AIM,
     STEERING_LOAD,
     STEERING_LOAD_AT,
     TIME,
@@ -32,6 +37,7 @@ from agvbench.types import Floats
 
 _EDGE_M = 0.015
 _EDGE_STEP_S = 0.025
+_PAUSE_ENDS_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -222,7 +228,7 @@ class SpeedAfterSteering(DiscrepancyTerm):
     longest_step_s: ClassVar[float] = 0.1
     needs_steered_axles: ClassVar[bool] = True
 
-    loss_per_rad: float = parameter(unit="1/rad", low=-1.0, high=1.0, scale=0.1)
+    loss_per_rad: float = parameter(unit="1/rad", low=-3.0, high=5.0, scale=0.1)
     time_constant_s: float = parameter(unit="s", low=0.05, high=20.0, scale=0.5, null=0.5)
 
     @staticmethod
@@ -242,3 +248,65 @@ class SpeedAfterSteering(DiscrepancyTerm):
             factor = 1.0 - loss_per_rad * decayed(state[STEERING_LOAD], since_s, time_constant_s)
             state[FRONT_SPEED] *= max(factor, 0.0)
             state[REAR_SPEED] *= max(factor, 0.0)
+
+
+@dataclass(frozen=True)
+class SpeedAfterDriving(DiscrepancyTerm):
+    """The vehicle is slower the more it drove in the last seconds: ``v ← v (1 − loss u)``, with ``T u̇ = |v_map| − u``.
+
+    A supply recovers at rest in the time T. A loss below 0 is a drive that warms up.
+    """
+
+    name: ClassVar[str] = "speed_after_driving"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("history", "time_in_run_s")
+    through: ClassVar[str] = "speed"
+    longest_step_s: ClassVar[float] = 0.1
+
+    loss_s_per_m: float = parameter(unit="s/m", low=-2.0, high=2.0, scale=0.1)
+    # A shorter one would be the lag of a drive.
+    time_constant_s: float = parameter(unit="s", low=0.15, high=60.0, scale=1.0, null=1.0)
+
+    @staticmethod
+    def aim(state: Floats, loss_s_per_m: float, time_constant_s: float) -> None:
+        """Average the commanded speed until now."""
+        if loss_s_per_m != 0.0:
+            since_s, held = state[TIME] - state[DRIVE_LOAD_AT], state[DRIVE_HELD]
+            state[DRIVE_LOAD] = held + decayed(state[DRIVE_LOAD] - held, since_s, time_constant_s)
+            state[DRIVE_HELD], state[DRIVE_LOAD_AT] = abs(state[SPEED_AIM]), state[TIME]
+
+    @staticmethod
+    def drive(state: Floats, loss_s_per_m: float, time_constant_s: float) -> None:
+        """Slow both axles in proportion to the average."""
+        if loss_s_per_m != 0.0:
+            since_s, held = state[TIME] - state[DRIVE_LOAD_AT], state[DRIVE_HELD]
+            load = held + decayed(state[DRIVE_LOAD] - held, since_s, time_constant_s)
+            factor = max(1.0 - loss_s_per_m * load, 0.0)
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor
+
+
+@dataclass(frozen=True)
+class PauseAtReversal(DiscrepancyTerm):
+    """The drive pauses before it drives in the other direction: ``v ← 0`` for the time ``pause_s`` after a reversal.
+
+    A speed controller brakes first, or the gears turn through their play. The end of the pause takes some hundredths of
+    a second.
+    """
+
+    name: ClassVar[str] = "pause_at_reversal"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("history", "direction")
+    through: ClassVar[str] = "speed"
+    longest_step_s: ClassVar[float] = _EDGE_STEP_S
+
+    pause_s: float = parameter(unit="s", low=0.0, high=2.0, scale=0.1)
+
+    @staticmethod
+    def drive(state: Floats, pause_s: float) -> None:
+        """Stop both axles after a reversal."""
+        if pause_s > 0.0:
+            ends = math.tanh((state[TIME] - state[DRIVE_REVERSED] - pause_s) / _PAUSE_ENDS_S)
+            factor = 1.0 - (1.0 - ends) / (1.0 + math.tanh(pause_s / _PAUSE_ENDS_S))
+            state[FRONT_SPEED] *= factor
+            state[REAR_SPEED] *= factor

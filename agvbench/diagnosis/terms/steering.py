@@ -6,29 +6,18 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.diagnosis.terms.base import DiscrepancyTerm, decayed
+from agvbench.diagnosis.terms.base import DiscrepancyTerm
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
-    CREEP_AT,
     DRIVE_START,
     FRONT,
     FRONT_AIM,
-    FRONT_BEFORE,
-    FRONT_CREEP,
-    FRONT_HELD,
-    FRONT_LAGS,
-    FRONT_LAGS_AT,
-    FRONT_REVERSAL,
+    HEADING,
     REAR,
     REAR_AIM,
-    REAR_BEFORE,
-    REAR_CREEP,
-    REAR_HELD,
-    REAR_LAGS,
-    REAR_LAGS_AT,
-    REAR_REVERSAL,
     SPEED,
     SPEED_AIM,
+    START_HEADING,
     TIME,
 )
 from agvbench.model.compiled import compiled
@@ -36,6 +25,8 @@ from agvbench.types import Floats
 
 # At this speed [m/s] the maps hold: a gain that grows with the speed from rest on would change them.
 TYPICAL_MPS = 0.2
+# Feedback that would destabilise the vehicle ends here.
+_LEAST_FEEDBACK = 0.2
 
 
 @dataclass(frozen=True)
@@ -56,6 +47,29 @@ class SteeringByDirection(DiscrepancyTerm):
         if state[SPEED] != 0.0:
             state[FRONT] += math.copysign(front_rad, front_rad * state[SPEED])
             state[REAR] += math.copysign(rear_rad, rear_rad * state[SPEED])
+
+
+@dataclass(frozen=True)
+class SteeringByVelocity(DiscrepancyTerm):
+    """The offset of the axle angles is proportional to the commanded velocity: ``δ ← δ + slope v_map``.
+
+    A part of the drive command reaches the servos, or the torque of the drive steers.
+    """
+
+    name: ClassVar[str] = "steering_by_velocity"
+    stage: ClassVar[Stage] = Stage.SERVO
+    covariates: ClassVar[tuple[str, ...]] = ("direction", "speed_mps")
+    through: ClassVar[str] = "steering"
+    needs_steered_axles: ClassVar[bool] = True
+
+    front_rad_s_per_m: float = parameter(unit="rad s/m", low=-1.0, high=1.0, scale=0.05)
+    rear_rad_s_per_m: float = parameter(unit="rad s/m", low=-1.0, high=1.0, scale=0.05)
+
+    @staticmethod
+    def aim(state: Floats, front_rad_s_per_m: float, rear_rad_s_per_m: float) -> None:
+        """Displace both targets."""
+        state[FRONT_AIM] += front_rad_s_per_m * state[SPEED_AIM]
+        state[REAR_AIM] += rear_rad_s_per_m * state[SPEED_AIM]
 
 
 @dataclass(frozen=True)
@@ -111,101 +125,85 @@ class SteeringAtStart(DiscrepancyTerm):
 
 
 @dataclass(frozen=True)
-class SteeringByHistory(DiscrepancyTerm):
-    """Axles stop short of their target by shares of a change of angle, the same for both axles.
+class SteeringByTurnedHeading(DiscrepancyTerm):
+    """The axles turn with the heading that the vehicle has turned in the run: ``δ ← δ + slope (ψ − ψ_start)``.
 
-    ``share`` is of the change since the previous command, ``since_reversal`` of that since the axle last reversed, as
-    in hysteresis of a gear. Few runs turn an axle back, and often only one of both: shares by axle would be poorly
-    determined.
+    A cable to the vehicle winds up, or a gyroscope holds a heading.
     """
 
-    name: ClassVar[str] = "steering_by_history"
-    stage: ClassVar[Stage] = Stage.SERVO
-    covariates: ClassVar[tuple[str, ...]] = ("history", "curvature_per_m")
-    through: ClassVar[str] = "steering"
-
-    share: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.05)
-    since_reversal: float = parameter(unit="–", low=-0.5, high=0.7, scale=0.05)
-
-    @staticmethod
-    def aim(state: Floats, share: float, since_reversal: float) -> None:
-        """Reduce the changes of both targets."""
-        front, rear = state[FRONT_AIM], state[REAR_AIM]
-        state[FRONT_AIM] -= share * (front - state[FRONT_BEFORE]) + since_reversal * (front - state[FRONT_REVERSAL])
-        state[REAR_AIM] -= share * (rear - state[REAR_BEFORE]) + since_reversal * (rear - state[REAR_REVERSAL])
-
-
-@compiled(inline=True)
-def lags_after(lags: float, travel: float, reach_rad: float) -> float:
-    """Return the share of the most by which an axle lags behind after a `travel` [rad] one way, of `lags` before it."""
-    most = math.copysign(1.0, travel)
-    return most + (lags - most) * math.exp(-abs(travel) / reach_rad)
-
-
-@dataclass(frozen=True)
-class SteeringByTravel(DiscrepancyTerm):
-    """Axles lag behind their target by an amount that saturates with the travel: ``δ ← δ − h z``, |z| ≤ 1.
-
-    ``dz = share (dδ − z |dδ|) / 2h`` is the equation of Dahl for friction beside an elastic linkage. Of a motion right
-    after a reversal ``share`` is lost, and less and less of it later. Backlash loses all of it within the gap and none
-    beyond: a share above a half would be a backlash in all but name. Both axles have the same parameters.
-    """
-
-    name: ClassVar[str] = "steering_by_travel"
-    stage: ClassVar[Stage] = Stage.SERVO
-    covariates: ClassVar[tuple[str, ...]] = ("history", "curvature_per_m")
-    through: ClassVar[str] = "steering"
-    form_of: ClassVar[frozenset[str]] = frozenset({"steering_backlash"})
-    distinguished_by: ClassVar[str] = "runs whose steering turns back by less than the backlash while they drive"
-
-    half_width_rad: float = parameter(unit="rad", low=0.0, high=0.3, scale=0.02)
-    share: float = parameter(unit="–", low=0.0, high=0.5, scale=0.2)
-
-    @staticmethod
-    def aim(state: Floats, half_width_rad: float, share: float) -> None:
-        """Reduce both targets by what the axles lag behind after their travel since the previous command."""
-        if half_width_rad > 0.0 and share > 0.0:
-            reach_rad = 2.0 * half_width_rad / share
-            front, rear = state[FRONT_AIM], state[REAR_AIM]
-            state[FRONT_LAGS] = lags_after(state[FRONT_LAGS], front - state[FRONT_LAGS_AT], reach_rad)
-            state[REAR_LAGS] = lags_after(state[REAR_LAGS], rear - state[REAR_LAGS_AT], reach_rad)
-            state[FRONT_LAGS_AT], state[REAR_LAGS_AT] = front, rear
-            state[FRONT_AIM] -= half_width_rad * state[FRONT_LAGS]
-            state[REAR_AIM] -= half_width_rad * state[REAR_LAGS]
-
-
-@dataclass(frozen=True)
-class SteeringCreep(DiscrepancyTerm):
-    """Axles creep after a step: ``δ ← δ + gain (δ_map − z)``, where z follows the target, ``T ż = δ_map − z``.
-
-    With a gain above 0 they go beyond their target at first and come back; below 0, a last part of the way takes long.
-    Both axles have the same parameters. A visco-elastic linkage creeps (standard linear solid).
-    """
-
-    name: ClassVar[str] = "steering_creep"
+    name: ClassVar[str] = "steering_by_turned_heading"
     stage: ClassVar[Stage] = Stage.WHEELS
-    covariates: ClassVar[tuple[str, ...]] = ("history", "time_in_run_s")
+    covariates: ClassVar[tuple[str, ...]] = ("turned_rad",)
     through: ClassVar[str] = "steering"
     longest_step_s: ClassVar[float] = 0.1
     needs_steered_axles: ClassVar[bool] = True
 
-    gain: float = parameter(unit="–", low=-0.7, high=0.7, scale=0.1)
-    # A shorter one would be the lag of a servo, a longer one a gain that the maps absorb.
-    time_constant_s: float = parameter(unit="s", low=0.15, high=20.0, scale=1.0, null=1.0)
+    front: float = parameter(unit="–", low=-1.0, high=1.0, scale=0.02)
+    rear: float = parameter(unit="–", low=-1.0, high=1.0, scale=0.02)
 
     @staticmethod
-    def aim(state: Floats, gain: float, time_constant_s: float) -> None:
-        """Add the steps of both targets to the ways that are left."""
-        if gain != 0.0:
-            front, rear, since_s = state[FRONT_AIM], state[REAR_AIM], state[TIME] - state[CREEP_AT]
-            state[FRONT_CREEP] = decayed(state[FRONT_CREEP], since_s, time_constant_s) + front - state[FRONT_HELD]
-            state[REAR_CREEP] = decayed(state[REAR_CREEP], since_s, time_constant_s) + rear - state[REAR_HELD]
-            state[FRONT_HELD], state[REAR_HELD], state[CREEP_AT] = front, rear, state[TIME]
+    def steer(state: Floats, front: float, rear: float) -> None:
+        """Turn both axles."""
+        turned = state[HEADING] - state[START_HEADING]
+        state[FRONT] += front * turned
+        state[REAR] += rear * turned
+
+
+@compiled(inline=True)
+def relative_tangent(front_rad: float, rear_rad: float) -> float:
+    """Return tan δ_f − tan δ_r: the curvature of the path of a vehicle, times the distance between its axles."""
+    return math.tan(front_rad) - math.tan(rear_rad)
+
+
+@dataclass(frozen=True)
+class SteeringByYawRate(DiscrepancyTerm):
+    """The axles turn against the yaw rate: ``δ ← δ − gain v (tan δ_f − tan δ_r)``, the feedback of a gyroscope.
+
+    The last factors are the yaw rate times the distance between the axles. Forward the vehicle turns less, and backward
+    more.
+    """
+
+    name: ClassVar[str] = "steering_by_yaw_rate"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("direction", "curvature_per_m", "speed_mps")
+    through: ClassVar[str] = "steering"
+    needs_steered_axles: ClassVar[bool] = True
+
+    front_s_per_m: float = parameter(unit="s/m", low=-1.0, high=1.0, scale=0.05)
+    rear_s_per_m: float = parameter(unit="s/m", low=-1.0, high=1.0, scale=0.05)
 
     @staticmethod
-    def steer(state: Floats, gain: float, time_constant_s: float) -> None:
-        """Add a share of the ways that are left."""
-        if gain != 0.0:
-            since_s = state[TIME] - state[CREEP_AT]
-            state[FRONT] += gain * decayed(state[FRONT_CREEP], since_s, time_constant_s)
-            state[REAR] += gain * decayed(state[REAR_CREEP], since_s, time_constant_s)
+    def steer(state: Floats, front_s_per_m: float, rear_s_per_m: float) -> None:
+        """Turn both axles, with the yaw rate that results."""
+        fed_back = 1.0 + (front_s_per_m - rear_s_per_m) * state[SPEED]
+        turns = state[SPEED] * relative_tangent(state[FRONT], state[REAR]) / max(fed_back, _LEAST_FEEDBACK)
+        state[FRONT] -= front_s_per_m * turns
+        state[REAR] -= rear_s_per_m * turns
+
+
+@dataclass(frozen=True)
+class SteeringBySideForce(DiscrepancyTerm):
+    """The axles yield to the side force: ``δ ← δ + most tanh(a / reach)`` with ``a = v² (tan δ_f − tan δ_r)``.
+
+    That is the lateral acceleration times the distance between the axles. An axle with play turns through all of it at
+    a small force; an elastic one yields in proportion, which a large ``reach`` describes.
+    """
+
+    name: ClassVar[str] = "steering_by_side_force"
+    stage: ClassVar[Stage] = Stage.WHEELS
+    covariates: ClassVar[tuple[str, ...]] = ("curvature_per_m", "speed_mps")
+    through: ClassVar[str] = "steering"
+    needs_steered_axles: ClassVar[bool] = True
+
+    front_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
+    rear_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
+    reach: float = parameter(unit="m²/s²", low=0.003, high=3.0, scale=0.05, null=0.05)
+
+    @staticmethod
+    def steer(state: Floats, front_rad: float, rear_rad: float, reach: float) -> None:
+        """Turn both axles to the side of the force, or against it."""
+        if front_rad != 0.0 or rear_rad != 0.0:
+            force = state[SPEED] * state[SPEED] * relative_tangent(state[FRONT], state[REAR])
+            share = math.tanh(force / reach)
+            state[FRONT] += front_rad * share
+            state[REAR] += rear_rad * share

@@ -27,7 +27,12 @@ from agvbench.effects.state import (
     DISTANCE,
     DRIVE_BACKLASH,
     DRIVE_COMMAND,
+    DRIVE_DIRECTION,
+    DRIVE_HELD,
     DRIVE_INERTIA,
+    DRIVE_LOAD,
+    DRIVE_LOAD_AT,
+    DRIVE_REVERSED,
     DRIVE_START,
     DRIVE_WAIT,
     DRIVES,
@@ -37,10 +42,13 @@ from agvbench.effects.state import (
     FRONT_COMMAND,
     FRONT_CREEP,
     FRONT_HELD,
+    FRONT_KEPT,
+    FRONT_KEPT_AT,
     FRONT_LAGS,
     FRONT_LAGS_AT,
     FRONT_MOVED_TO,
     FRONT_REVERSAL,
+    FRONT_SLIPPED,
     HEADING,
     HOURS,
     KNOWN_FRONT,
@@ -51,11 +59,14 @@ from agvbench.effects.state import (
     REAR_COMMAND,
     REAR_CREEP,
     REAR_HELD,
+    REAR_KEPT,
+    REAR_KEPT_AT,
     REAR_LAG_RATIO,
     REAR_LAGS,
     REAR_LAGS_AT,
     REAR_MOVED_TO,
     REAR_REVERSAL,
+    REAR_SLIPPED,
     REAR_WAIT,
     RIGHT_RATE_RATIO,
     ROLLED,
@@ -63,6 +74,7 @@ from agvbench.effects.state import (
     SIZE,
     SPEED,
     SPEED_AIM,
+    START_HEADING,
     STEERING_ACCELERATION,
     STEERING_INERTIA,
     STEERING_LAG,
@@ -123,6 +135,10 @@ def _obey(
     if drives > s[DRIVES]:
         s[DRIVE_START] = now
     s[DRIVES] = drives
+    if settled[driven, 2] * s[DRIVE_DIRECTION] < 0.0:
+        s[DRIVE_REVERSED] = now
+    if settled[driven, 2] != 0.0:
+        s[DRIVE_DIRECTION] = math.copysign(1.0, settled[driven, 2])
     if lift != 0.0 and settled[driven, 2] != 0.0:
         s[SPEED_AIM] = math.copysign(max(abs(settled[driven, 2]) + lift, 0.0), settled[driven, 2])
     s[STEERING_LAG], s[STEERING_RATE], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0
@@ -273,6 +289,11 @@ def _drive_run(
     s[FRONT_MOVED_TO], s[REAR_MOVED_TO] = settled[first, 0], settled[first, 1]
     s[STEERING_LOAD] = s[STEERING_LOAD_AT] = s[FRONT_CREEP] = s[REAR_CREEP] = s[CREEP_AT] = 0.0
     s[FRONT_HELD], s[REAR_HELD] = settled[first, 0], settled[first, 1]
+    s[FRONT_KEPT], s[REAR_KEPT] = settled[first, 0], settled[first, 1]
+    s[FRONT_KEPT_AT], s[REAR_KEPT_AT] = commands[first, 1], commands[first, 2]
+    s[FRONT_SLIPPED] = s[REAR_SLIPPED] = 0.0
+    s[DRIVE_LOAD] = s[DRIVE_LOAD_AT] = s[DRIVE_HELD] = s[DRIVE_DIRECTION] = 0.0
+    s[DRIVE_REVERSED], s[START_HEADING] = -math.inf, start[2]
     driven = front = rear = first
     while now < math.inf:
         _obey(s, p, commands, settled, driven, front, rear, lift, now)
