@@ -14,7 +14,9 @@ from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.discrepancy.regression import FOLDS, GroupedRegression
 from agvbench.diagnosis.discrepancy.screening import Start, screen
+from agvbench.diagnosis.discrepancy.shapes import Evidence, every_shape
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, dependences
 from agvbench.diagnosis.residuals.periodic import periodic_disturbance
@@ -264,3 +266,16 @@ def test_servos_that_are_slow_while_they_are_cold_are_named_with_their_change(ti
     assert term["parameters"]["time_constant_h"] == pytest.approx(0.4, rel=0.2)
     position = found.held_out.errors["position_rms_mm"]
     assert position["after"] < 0.3 * position["before"]
+
+
+def test_every_term_has_a_shape_that_is_screened():
+    rates, straight = drives(1), np.zeros((RUNS * STEPS, 2))
+    turned = history_of(straight + 0.1, straight)
+    logged = dataclasses.replace(rates, standardised=np.linspace(-1.0, 1.0, RUNS * STEPS)[:, None])
+    regression = GroupedRegression(rates, turned, np.arange(RUNS * STEPS) % FOLDS)
+    screened_terms = {
+        term
+        for geometry in (GEOMETRY, Geometry(0.0, 0.05, kinematics="differential"))
+        for term, _ in every_shape(Evidence(logged, turned, geometry, regression))
+    }
+    assert screened_terms == set(terms.TERMS)
