@@ -16,7 +16,7 @@ from agvbench.types import Floats
 REACHES_RAD = (0.05, 0.1, 0.2, 0.4)
 RECOVERIES_S = (0.2, 0.4, 0.8, 1.6)
 LOADS_S = (0.5, 1.0, 2.0, 4.0, 8.0)
-DEAD_BANDS = tuple(np.geomspace(0.01, 0.8, 24).tolist())
+DEAD_BANDS = tuple(np.geomspace(0.01, 0.8, 72).tolist())
 """Widths of a dead band, as shares of the largest distance of a steering command from neutral."""
 SLIPS_BEYOND = tuple(np.linspace(0.1, 0.95, 18).tolist())
 """Distances from neutral beyond which a linkage slips, as such shares."""

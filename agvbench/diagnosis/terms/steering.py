@@ -175,10 +175,11 @@ class SteeringByYawRate(DiscrepancyTerm):
     @staticmethod
     def steer(state: Floats, front_s_per_m: float, rear_s_per_m: float) -> None:
         """Turn both axles, with the yaw rate that results."""
-        fed_back = 1.0 + (front_s_per_m - rear_s_per_m) * state[SPEED]
-        turns = state[SPEED] * relative_tangent(state[FRONT], state[REAR]) / max(fed_back, _LEAST_FEEDBACK)
-        state[FRONT] -= front_s_per_m * turns
-        state[REAR] -= rear_s_per_m * turns
+        if front_s_per_m != 0.0 or rear_s_per_m != 0.0:
+            fed_back = 1.0 + (front_s_per_m - rear_s_per_m) * state[SPEED]
+            turns = state[SPEED] * relative_tangent(state[FRONT], state[REAR]) / max(fed_back, _LEAST_FEEDBACK)
+            state[FRONT] -= front_s_per_m * turns
+            state[REAR] -= rear_s_per_m * turns
 
 
 @dataclass(frozen=True)
