@@ -107,6 +107,16 @@ def test_within_chance_the_deviance_decides(gain_mm2, deviance, is_better):
     assert _is_better((deviance, own), (0.0, base)) is is_better
 
 
+@pytest.mark.parametrize("deviance", [-1.0, 1.0])
+def test_few_groups_with_large_errors_do_not_decide_for_the_others(deviance):
+    """The means are equal within chance, and 95 of 100 groups have smaller errors."""
+    rng = np.random.default_rng(0)
+    base = rng.uniform(200e-6, 800e-6, 100)
+    own = np.where(np.arange(100) % 20, 0.6 * base, 6.0 * base)
+    assert _is_better((deviance, own), (0.0, base))
+    assert not _is_better((deviance, base), (0.0, own))
+
+
 def test_the_maps_alone_are_not_fitted_again_to_be_compared_with_themselves(tried, monkeypatch):
     selector, _, _ = tried
     base = selector.base()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.splits import folds
+from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.estimation.levenberg_marquardt import FitState, LevenbergMarquardt
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -151,8 +152,8 @@ def predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
 def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector) -> bool:
     """Return whether `chosen` predicts runs that are left out better than `base`.
 
-    A third of the groups is left out at a time, and both models are fitted anew to the others. The squared position
-    errors differ by more than chance, or the deviance decides: here are enough runs to require a gain.
+    A third of the groups is left out at a time, and both models are fitted anew to the others. Here are enough runs to
+    require a gain.
     """
     if chosen.names == base.names:
         return True
@@ -168,17 +169,28 @@ def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector
         for i, model in enumerate((chosen, base)):
             loss, square[i, fold == k] = _in_batch(refitted.score(model.names, model.fit.parameters, None), own)
             deviance[i] += loss
-    return _is_better((deviance[0], square[0]), (deviance[1], square[1]))
+    group = batch.readings.group
+    groups = [by_group(of, group) / by_group(np.ones(len(group)), group) for of in square]
+    return _is_better((deviance[0], groups[0]), (deviance[1], groups[1]))
 
 
 def _is_better(own: tuple[float, Floats], base: tuple[float, Floats]) -> bool:
-    """Return whether mean squared position errors by run (R,) are smaller; within chance, the deviances decide."""
+    """Return whether squared position errors by group (G,) are smaller, for models with a deviance each.
+
+    Their means differ by more than chance. Within chance, both their means and, by more than chance, their geometric
+    means agree: a few groups with large errors must not decide for all others. Otherwise the deviances decide.
+    """
     worse, chance = _difference(own[1], base[1])
-    return worse < -chance or (worse <= chance and own[0] <= base[0])
+    if abs(worse) > chance:
+        return worse < 0.0
+    typical, chance = _difference(np.log(own[1]), np.log(base[1]))
+    if abs(typical) > chance and typical * worse >= 0.0:
+        return typical < 0.0
+    return own[0] <= base[0]
 
 
 def _difference(own: Floats, base: Floats) -> tuple[float, float]:
-    """Return by how much squared errors by run (R,) exceed others in the mean, and by how much they may by chance."""
+    """Return by how much values (n,) exceed others in the mean, and by how much they may by chance."""
     worse = own - base
     chance = RESIDUAL.validation_standard_errors * np.std(worse) / np.sqrt(max(len(worse) - 1, 1))
     return float(np.mean(worse)), float(chance)
