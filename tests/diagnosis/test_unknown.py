@@ -14,6 +14,7 @@ from agvbench.diagnosis import Verdict, diagnose, terms
 from agvbench.diagnosis.checks.consistency import require_consistent_repeats
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import read_runs
+from agvbench.diagnosis.discrepancy.campaign_time import by_axle_angles
 from agvbench.diagnosis.discrepancy.regression import FOLDS, GroupedRegression
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.discrepancy.shapes import Evidence, every_shape
@@ -279,3 +280,21 @@ def test_every_term_has_a_shape_that_is_screened():
         for term, _ in every_shape(Evidence(logged, turned, geometry, regression))
     }
     assert screened_terms == set(terms.TERMS)
+
+
+def test_maps_of_a_front_axle_do_not_absorb_what_the_rear_axle_does():
+    """A rear axle that turns with the front command has another lateral velocity, and no map of the front axle."""
+    rates, rear_m = drives(5), GEOMETRY.rear_axle_m
+    side = np.where(GROUP % 2, 1.0, -1.0)[rates.run]
+    levels = np.column_stack([np.zeros_like(rates.run), GROUP[rates.run] % 2, np.zeros_like(rates.run)])
+    history = history_of(0.1 * np.column_stack([side, 0.0 * side]), np.zeros((len(side), 2)), levels)
+    columns = by_axle_angles(side, side, history, GEOMETRY)
+    of_front, of_rear = ({k: c[:, [axle]] for k, c in columns.items()} for axle in (0, 1))
+    for moved, is_seen in ((of_front, False), (of_rear, True)):
+        value = rates.value + 0.02 * np.column_stack([0.0 * side, moved[1], moved[2]])
+        regression = GroupedRegression(
+            dataclasses.replace(rates, value=value), history, GROUP[rates.run] % FOLDS, rear_m
+        )
+        gain, (size,) = regression.gain(of_rear)
+        assert (gain > 10.0) is is_seen
+        assert size == pytest.approx(0.02 if is_seen else 0.0, abs=0.003)

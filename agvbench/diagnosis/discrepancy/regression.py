@@ -24,13 +24,22 @@ Columns = dict[int, Floats]
 
 
 class GroupedRegression:
-    """Regression of residual rates without the part that maps absorb, each feature in units of its residual."""
+    """Regression of residual rates without the part that maps absorb, each feature in units of its residual.
 
-    def __init__(self, rates: Rates, history: CommandHistory, fold: NDArray[np.int64]) -> None:
+    The map of a steered axle absorbs what depends on its command. Where the rear axle is never steered, the lateral
+    velocity is that at the rear axle, ``rear_axle_m`` behind the marker centroid: no map of the front axle changes it.
+    """
+
+    def __init__(
+        self, rates: Rates, history: CommandHistory, fold: NDArray[np.int64], rear_axle_m: float | None = None
+    ) -> None:
+        is_steered = rear_axle_m is None or len(np.unique(history.levels[:, 2])) > 1
+        self.rear_axle_m = 0.0 if is_steered or rear_axle_m is None else rear_axle_m
         self.folds, self.sqrt_weight = [np.flatnonzero(fold == f) for f in range(FOLDS)], np.sqrt(rates.weight)
         drive, axles = _dummies(history.levels[:, 0]), [_dummies(history.levels[:, k]) for k in (1, 2)]
-        self.absorbed = [self._orthogonal([drive]), *[self._orthogonal(axles)] * 2]
-        self.values = [self._without_maps(k, winsorised(rates.value[:, k])) for k in range(3)]
+        self.absorbed = [self._orthogonal(of) for of in ([drive], axles if is_steered else [], axles)]
+        values = self._at_rear_axle({k: rates.value[:, k] for k in range(3)})
+        self.values = [self._without_maps(k, winsorised(values[k])) for k in range(3)]
         self.size = [max(float(np.sqrt(np.mean(v * v))), _MIN_SCALE) for v in self.values]
         self.values = [v / s for v, s in zip(self.values, self.size, strict=True)]
         self.count = len(np.unique(rates.run))
@@ -44,9 +53,14 @@ class GroupedRegression:
         weighted = (columns.T * self.sqrt_weight).T
         return np.asarray(weighted - self.absorbed[k] @ (self.absorbed[k].T @ weighted))
 
+    def _at_rear_axle(self, columns: Columns) -> Columns:
+        if not self.rear_axle_m or 2 not in columns:
+            return columns
+        return columns | {1: columns.get(1, 0.0) - self.rear_axle_m * columns[2]}
+
     def gain(self, columns: Columns) -> tuple[float, Floats]:
         """Return the log likelihood gain of `columns` in the folds left out, and their coefficients from all folds."""
-        projected = {k: self._without_maps(k, c) / self.size[k] for k, c in columns.items()}
+        projected = {k: self._without_maps(k, c) / self.size[k] for k, c in self._at_rear_axle(columns).items()}
         matrices, gradients = (
             np.array(of) for of in zip(*(self._products(k, c) for k, c in projected.items()), strict=True)
         )

@@ -47,7 +47,8 @@ def screen(
     rates: Rates, history: CommandHistory, geometry: Geometry, group: NDArray[np.int64], seed: int
 ) -> list[Start]:
     """Return the best start of each term with a predicted gain, the largest gain first."""
-    regression = GroupedRegression(rates, history, folds(group, FOLDS, seed)[rates.run])
+    rear_axle_m = None if geometry.is_differential else geometry.rear_axle_m
+    regression = GroupedRegression(rates, history, folds(group, FOLDS, seed)[rates.run], rear_axle_m)
     found: dict[type[DiscrepancyTerm], Start] = {}
     for term, shapes in every_shape(Evidence(rates, history, geometry, regression)):
         best: Start | None = None
