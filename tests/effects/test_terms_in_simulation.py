@@ -38,8 +38,8 @@ def poses(term: DiscrepancyTerm, rows: np.ndarray, t_s: np.ndarray, fronts: list
     # The diagnosis compiles this kernel in any case.
     half = 0.5 * WHEELBASE_M
     simulation = Simulation(Geometry(half, half), NEUTRAL, [SimulatedRun(commands, t_s)], kinds=EXTENDED_LIBRARY)
-    settled = np.vstack([np.zeros(3), rows])
-    return simulation.predict(settled, simulation.parameters([term]), np.array([[0.5, 0.2, 0.0, 0.0]])).reshape(-1, 3)
+    steady = np.vstack([np.zeros(3), rows])
+    return simulation.predict(steady, simulation.parameters([term]), np.array([[0.5, 0.2, 0.0, 0.0]])).reshape(-1, 3)
 
 
 def constant(front: float, rear: float, speed: float = SPEED_MPS, seconds: int = 2) -> np.ndarray:

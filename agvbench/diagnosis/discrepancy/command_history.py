@@ -56,19 +56,19 @@ class CommandHistory:
 def command_history(batch: Batch, parameters: Floats, rates: Rates) -> CommandHistory:
     """Return the history at each rate, by the nodal values in `parameters`."""
     where, roles = batch.maps.slices(), ("front", "rear")
-    settled = np.column_stack([batch.weights[role] @ parameters[where[role]] for role in roles])
+    angles = np.column_stack([batch.weights[role] @ parameters[where[role]] for role in roles])
     commands = np.column_stack([batch.commands[role] - getattr(batch.maps.neutral, role) for role in roles])
     reach = float(np.max(np.abs(commands)))
-    axles = [_axles_at_rows(batch, commands[:, k], settled[:, k], reach) for k in range(len(roles))]
+    axles = [_axles_at_rows(batch, commands[:, k], angles[:, k], reach) for k in range(len(roles))]
     previous, reversal, lags, kept, above, below = (np.stack(of, axis=1) for of in zip(*axles, strict=True))
     velocity = batch.weights["drive"] @ parameters[where["drive"]]
     speed, (load, reversed_at_s) = np.abs(velocity), _drive_at_rows(batch, velocity)
     rows, since_s = _rows(batch, rates)
-    moved = _moves(batch, settled)[rows] * np.exp(-since_s[:, None, None] / RECOVERIES_S)
+    moved = _moves(batch, angles)[rows] * np.exp(-since_s[:, None, None] / RECOVERIES_S)
     levels = np.column_stack(
         [np.unique(batch.commands[role], return_inverse=True)[1][rows] for role in ("drive", *roles)]
     )
-    now, before, at_reversal = np.tan(np.clip([settled, previous, reversal], -1.4, 1.4))[:, rows]
+    now, before, at_reversal = np.tan(np.clip([angles, previous, reversal], -1.4, 1.4))[:, rows]
     return CommandHistory(
         now,
         before,
@@ -77,7 +77,7 @@ def command_history(batch: Batch, parameters: Floats, rates: Rates) -> CommandHi
         lags=lags[rows],
         loads=moved[:, 0],
         creeps=moved[:, 1:],
-        kept=kept[rows] - settled[rows, :, None],
+        kept=kept[rows] - angles[rows, :, None],
         above=above[rows],
         below=below[rows],
         reach=reach,
@@ -130,12 +130,12 @@ class _Axle:
         return self.previous, self.reversal, self.lags, self.kept, self.above, self.below
 
 
-def _axles_at_rows(batch: Batch, commands: Floats, settled: Floats, reach: float) -> list[Floats]:
+def _axles_at_rows(batch: Batch, commands: Floats, angles: Floats, reach: float) -> list[Floats]:
     """Return what `_Axle.obey` does for each row of commands (rows,) with their angles (rows,)."""
     rows = []
     for first, last in pairwise(batch.base.row_starts.tolist()):
-        axle = _Axle(commands[first], settled[first], reach)
-        rows += [axle.obey(*row) for row in zip(commands[first:last], settled[first:last], strict=True)]
+        axle = _Axle(commands[first], angles[first], reach)
+        rows += [axle.obey(*row) for row in zip(commands[first:last], angles[first:last], strict=True)]
     return [np.array(column) for column in zip(*rows, strict=True)]
 
 
@@ -156,17 +156,17 @@ def _drive_at_rows(batch: Batch, velocity: Floats) -> tuple[Floats, Floats]:
     return load, reversed_at_s
 
 
-def _moves(batch: Batch, settled: Floats) -> Floats:
+def _moves(batch: Batch, angles: Floats) -> Floats:
     """Return what the servos have moved recently (rows, 3, times) right after each command.
 
     That is the sum of both amounts, and the way of either axle with its sign, for steady-state angles (rows, 2).
     """
-    moves = np.zeros((len(settled), 3, len(RECOVERIES_S)))
+    moves = np.zeros((len(angles), 3, len(RECOVERIES_S)))
     for r, run in enumerate(batch.readings.runs):
         first, last = batch.base.row_starts[r : r + 2]
         times = run.commands.t_s
         left = np.exp(-np.diff(times, prepend=times[0])[:, None] / RECOVERIES_S)
-        ways = np.diff(settled[first:last], axis=0)
+        ways = np.diff(angles[first:last], axis=0)
         ways = np.column_stack([np.abs(ways).sum(axis=1), ways])[:, :, None]
         for row in range(first + 1, last):
             moves[row] = moves[row - 1] * left[row - first - 1] + ways[row - first - 1]

@@ -164,7 +164,7 @@ def lack_of_fit(
     within_dof, between_dof = 3 * (len(group) - len(names)), 3 * len(tested_names)
     if within_dof < _MIN_WITHIN_DOF or not between_dof:
         return None
-    deviation = residuals.ends - _by_group(residuals.ends, index)[index]
+    deviation = residuals.ends - group_means(residuals.ends, index)[index]
     covariance = covariance or _equal_covariance(deviation, within_dof // 3)
     within = _within(deviation, index, covariance)
     if within <= 0.0:
@@ -181,21 +181,21 @@ def _equal_covariance(deviation: Floats, dof: int) -> EndCovariance:
 
 def _within(deviation: Floats, index: NDArray[np.int64], covariance: EndCovariance) -> float:
     """Return the whitened sum of squares within groups, of deviations (R, 3) from group means."""
-    own = _by_group(covariance.own, index)
+    own = group_means(covariance.own, index)
     return sum(float(np.sum(_whitened(own[g], deviation[index == g].T) ** 2)) for g in range(len(own)))
 
 
 def _between(ends: Floats, index: NDArray[np.int64], covariance: EndCovariance) -> float:
     """Return the whitened sum of squares between groups, of their mean residuals."""
-    means, own = _by_group(ends, index), _by_group(covariance.own, index)
-    slopes = _by_group(covariance.slopes, index).reshape(means.size, -1)
+    means, own = group_means(ends, index), group_means(covariance.own, index)
+    slopes = group_means(covariance.slopes, index).reshape(means.size, -1)
     shared = slopes @ covariance.parameters @ slopes.T
     for g, size in enumerate(np.bincount(index)):
         shared[3 * g : 3 * g + 3, 3 * g : 3 * g + 3] += own[g] / size
     return float(np.sum(_whitened(shared, means.ravel()) ** 2))
 
 
-def _by_group(values: Floats, index: NDArray[np.int64]) -> Floats:
+def group_means(values: Floats, index: NDArray[np.int64]) -> Floats:
     """Return the mean of runs' values (R, …) in each group (G, …)."""
     return np.array([values[index == g].mean(axis=0) for g in range(int(index.max()) + 1)])
 

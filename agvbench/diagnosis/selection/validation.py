@@ -11,13 +11,18 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.splits import folds
-from agvbench.diagnosis.estimation.cross_validation import by_group
 from agvbench.diagnosis.estimation.levenberg_marquardt import FitState, LevenbergMarquardt
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.bias_test import bias_p_value
 from agvbench.diagnosis.residuals.repeatability import repeatability, reproducibility
-from agvbench.diagnosis.residuals.residuals import EndCovariance, PoseResiduals, lack_of_fit, pose_residuals
+from agvbench.diagnosis.residuals.residuals import (
+    EndCovariance,
+    PoseResiduals,
+    group_means,
+    lack_of_fit,
+    pose_residuals,
+)
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
@@ -169,9 +174,9 @@ def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector
         for i, model in enumerate((chosen, base)):
             loss, square[i, fold == k] = _in_batch(refitted.score(model.names, model.fit.parameters, None), own)
             deviance[i] += loss
-    group = batch.readings.group
-    groups = [by_group(of, group) / by_group(np.ones(len(group)), group) for of in square]
-    return _is_better((deviance[0], groups[0]), (deviance[1], groups[1]))
+    _, index = np.unique(batch.readings.group, return_inverse=True)
+    errors = group_means(square.T, index).T
+    return _is_better((deviance[0], errors[0]), (deviance[1], errors[1]))
 
 
 def _is_better(own: tuple[float, Floats], base: tuple[float, Floats]) -> bool:

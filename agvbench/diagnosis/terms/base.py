@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from agvbench.effects.base import Effect
+from agvbench.effects.base import Effect, parameter
 from agvbench.model.compiled import compiled
 
 
@@ -25,6 +25,11 @@ class DiscrepancyTerm(Effect):
     through: ClassVar[str]
     form_of: ClassVar[frozenset[str]] = frozenset()
     distinguished_by: ClassVar[str] = ""
+
+
+def coordinate() -> Any:
+    """Declare a coordinate on the floor, or a distance from its origin."""
+    return parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
 
 
 @compiled(inline=True)

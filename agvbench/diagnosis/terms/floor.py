@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from agvbench.diagnosis.terms.base import DiscrepancyTerm
+from agvbench.diagnosis.terms.base import DiscrepancyTerm, coordinate
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
     FORWARD,
@@ -41,8 +41,8 @@ class DriftToPoint(DiscrepancyTerm):
     longest_step_s: ClassVar[float] = _FIELD_STEP_S
 
     mps: float = parameter(unit="m/s", low=-0.3, high=0.3, scale=0.005)
-    x_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
-    y_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    x_m: float = coordinate()
+    y_m: float = coordinate()
     core_m: float = parameter(unit="m", low=0.0, high=20.0, scale=0.3)
 
     @staticmethod
@@ -126,8 +126,8 @@ class PullOfCable(DiscrepancyTerm):
     longest_step_s: ClassVar[float] = _FIELD_STEP_S
 
     per_s: float = parameter(unit="1/s", low=-1.0, high=1.0, scale=0.05)
-    x_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
-    y_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    x_m: float = coordinate()
+    y_m: float = coordinate()
     slack_m: float = parameter(unit="m", low=0.0, high=20.0, scale=0.3)
 
     @staticmethod

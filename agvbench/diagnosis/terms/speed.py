@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.diagnosis.terms.base import DiscrepancyTerm, decayed
+from agvbench.diagnosis.terms.base import DiscrepancyTerm, coordinate, decayed
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
     DRIVE_HELD,
@@ -51,8 +51,8 @@ class SpeedInDisc(DiscrepancyTerm):
     longest_step_s: ClassVar[float] = _EDGE_STEP_S
 
     loss: float = parameter(unit="–", low=-1.0, high=0.9, scale=0.1)
-    x_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
-    y_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    x_m: float = coordinate()
+    y_m: float = coordinate()
     radius_m: float = parameter(unit="m", low=0.0, high=20.0, scale=0.3)
 
     @staticmethod
@@ -79,7 +79,7 @@ class SpeedInStrip(DiscrepancyTerm):
     longest_step_s: ClassVar[float] = _EDGE_STEP_S
 
     loss: float = parameter(unit="–", low=-1.0, high=0.9, scale=0.1)
-    place_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    place_m: float = coordinate()
     direction_rad: float = parameter(unit="rad", low=-math.tau, high=math.tau, scale=0.3)
     width_m: float = parameter(unit="m", low=0.0, high=20.0, scale=0.3)
 
@@ -250,6 +250,12 @@ class SpeedAfterSteering(DiscrepancyTerm):
             state[REAR_SPEED] *= max(factor, 0.0)
 
 
+@compiled(inline=True)
+def mean_after(mean: float, held: float, since_s: float, time_constant_s: float) -> float:
+    """Return the mean of the last seconds of what was `held` since then, `since_s` seconds after the mean was known."""
+    return held + decayed(mean - held, since_s, time_constant_s)
+
+
 @dataclass(frozen=True)
 class SpeedAfterDriving(DiscrepancyTerm):
     """The vehicle is slower the more it drove in the last seconds: ``v ← v (1 − loss u)``, with ``T u̇ = |v_map| − u``.
@@ -271,16 +277,16 @@ class SpeedAfterDriving(DiscrepancyTerm):
     def aim(state: Floats, loss_s_per_m: float, time_constant_s: float) -> None:
         """Average the commanded speed until now."""
         if loss_s_per_m != 0.0:
-            since_s, held = state[TIME] - state[DRIVE_LOAD_AT], state[DRIVE_HELD]
-            state[DRIVE_LOAD] = held + decayed(state[DRIVE_LOAD] - held, since_s, time_constant_s)
+            since_s = state[TIME] - state[DRIVE_LOAD_AT]
+            state[DRIVE_LOAD] = mean_after(state[DRIVE_LOAD], state[DRIVE_HELD], since_s, time_constant_s)
             state[DRIVE_HELD], state[DRIVE_LOAD_AT] = abs(state[SPEED_AIM]), state[TIME]
 
     @staticmethod
     def drive(state: Floats, loss_s_per_m: float, time_constant_s: float) -> None:
         """Slow both axles in proportion to the average."""
         if loss_s_per_m != 0.0:
-            since_s, held = state[TIME] - state[DRIVE_LOAD_AT], state[DRIVE_HELD]
-            load = held + decayed(state[DRIVE_LOAD] - held, since_s, time_constant_s)
+            since_s = state[TIME] - state[DRIVE_LOAD_AT]
+            load = mean_after(state[DRIVE_LOAD], state[DRIVE_HELD], since_s, time_constant_s)
             factor = max(1.0 - loss_s_per_m * load, 0.0)
             state[FRONT_SPEED] *= factor
             state[REAR_SPEED] *= factor

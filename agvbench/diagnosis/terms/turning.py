@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from agvbench.diagnosis.terms.base import DiscrepancyTerm
+from agvbench.diagnosis.terms.base import DiscrepancyTerm, coordinate
 from agvbench.effects.base import Stage, parameter
 from agvbench.effects.state import (
     DISTANCE,
@@ -46,7 +46,7 @@ class TurnAtLine(DiscrepancyTerm):
 
     turn_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
     same_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
-    place_m: float = parameter(unit="m", low=-50.0, high=50.0, scale=0.5)
+    place_m: float = coordinate()
     direction_rad: float = parameter(unit="rad", low=-2.0 * _TURN, high=2.0 * _TURN, scale=0.5)
 
     @staticmethod

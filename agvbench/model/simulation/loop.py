@@ -255,6 +255,24 @@ def _begin_in_motion(
 
 
 @compiled(inner=True)
+def _reset_memory(s: Floats, commands: Floats, settled: Floats, first: int, heading: float) -> None:
+    """Put into `s` what effects remember at the start of a run: there is no command before the first one."""
+    s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
+    s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
+    s[FRONT_REVERSAL], s[REAR_REVERSAL] = settled[first, 0], settled[first, 1]
+    s[FRONT_LAGS] = s[REAR_LAGS] = s[DRIVES] = 0.0
+    s[FRONT_LAGS_AT], s[REAR_LAGS_AT] = settled[first, 0], settled[first, 1]
+    s[FRONT_MOVED_TO], s[REAR_MOVED_TO] = settled[first, 0], settled[first, 1]
+    s[STEERING_LOAD] = s[STEERING_LOAD_AT] = s[FRONT_CREEP] = s[REAR_CREEP] = s[CREEP_AT] = 0.0
+    s[FRONT_HELD], s[REAR_HELD] = settled[first, 0], settled[first, 1]
+    s[FRONT_KEPT], s[REAR_KEPT] = settled[first, 0], settled[first, 1]
+    s[FRONT_KEPT_AT], s[REAR_KEPT_AT] = commands[first, 1], commands[first, 2]
+    s[FRONT_SLIPPED] = s[REAR_SLIPPED] = 0.0
+    s[DRIVE_LOAD] = s[DRIVE_LOAD_AT] = s[DRIVE_HELD] = s[DRIVE_DIRECTION] = 0.0
+    s[DRIVE_REVERSED], s[START_HEADING] = -math.inf, heading
+
+
+@compiled(inner=True)
 def _drive_run(
     s: Floats,
     p: Floats,
@@ -280,20 +298,7 @@ def _drive_run(
 ) -> None:
     """Simulate one run, whose pose is held until `begin`; commands before that move the actuators only."""
     now, lift = -math.inf, 0.0
-    # There is no command before the first one.
-    s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
-    s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
-    s[FRONT_REVERSAL], s[REAR_REVERSAL] = settled[first, 0], settled[first, 1]
-    s[FRONT_LAGS] = s[REAR_LAGS] = s[DRIVES] = 0.0
-    s[FRONT_LAGS_AT], s[REAR_LAGS_AT] = settled[first, 0], settled[first, 1]
-    s[FRONT_MOVED_TO], s[REAR_MOVED_TO] = settled[first, 0], settled[first, 1]
-    s[STEERING_LOAD] = s[STEERING_LOAD_AT] = s[FRONT_CREEP] = s[REAR_CREEP] = s[CREEP_AT] = 0.0
-    s[FRONT_HELD], s[REAR_HELD] = settled[first, 0], settled[first, 1]
-    s[FRONT_KEPT], s[REAR_KEPT] = settled[first, 0], settled[first, 1]
-    s[FRONT_KEPT_AT], s[REAR_KEPT_AT] = commands[first, 1], commands[first, 2]
-    s[FRONT_SLIPPED] = s[REAR_SLIPPED] = 0.0
-    s[DRIVE_LOAD] = s[DRIVE_LOAD_AT] = s[DRIVE_HELD] = s[DRIVE_DIRECTION] = 0.0
-    s[DRIVE_REVERSED], s[START_HEADING] = -math.inf, start[2]
+    _reset_memory(s, commands, settled, first, start[2])
     driven = front = rear = first
     while now < math.inf:
         _obey(s, p, commands, settled, driven, front, rear, lift, now)

@@ -18,6 +18,10 @@ Option = tuple[Columns, Callable[[Floats], list[float]]]
 Shapes = Iterator[tuple[type[DiscrepancyTerm], Iterator[Option]]]
 
 
+RUN_TIMES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
+"""Time constants of what decays since the start of a run."""
+
+
 @dataclass(frozen=True)
 class Evidence:
     """The residual rates, what was commanded before each, the axles' positions, and the regression of the rates."""

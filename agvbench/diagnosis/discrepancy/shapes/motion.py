@@ -10,7 +10,7 @@ import numpy as np
 from agvbench.diagnosis import terms
 from agvbench.diagnosis.discrepancy.command_history import LOADS_S, RECOVERIES_S, CommandHistory
 from agvbench.diagnosis.discrepancy.regression import Columns
-from agvbench.diagnosis.discrepancy.shapes.base import Evidence, Option, Shapes, Values
+from agvbench.diagnosis.discrepancy.shapes.base import RUN_TIMES_S, Evidence, Option, Shapes, Values
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms.speed import angle_beyond
 from agvbench.types import Floats
@@ -19,7 +19,6 @@ _FROM_RAD, _ANGLE_REACHES_RAD = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5), (0.03, 0.2, 1.0)
 _COASTS_S = 0.2
 _PAUSES_S, _LEAST_LOST = (0.1, 0.2, 0.4), 0.05
 _WAVES_M = np.geomspace(0.12, 1.5, 50)
-_RUN_TIMES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
 
 
 class _Pause(Values):
@@ -56,7 +55,7 @@ def motion_shapes(of: Evidence) -> Shapes:
 
 
 def _run_times(rates: Rates) -> Iterator[Option]:
-    for constant in _RUN_TIMES_S:
+    for constant in RUN_TIMES_S:
         column = np.expm1(-rates.covariates["time_in_run_s"] / constant)
         yield {0: column[:, None]}, Values(constant)
 

@@ -16,14 +16,13 @@ from agvbench.diagnosis.discrepancy.command_history import (
     CommandHistory,
 )
 from agvbench.diagnosis.discrepancy.regression import GroupedRegression
-from agvbench.diagnosis.discrepancy.shapes.base import Evidence, Option, Shapes, Values
+from agvbench.diagnosis.discrepancy.shapes.base import RUN_TIMES_S, Evidence, Option, Shapes, Values
 from agvbench.diagnosis.residuals.body_rates import Rates
 from agvbench.diagnosis.terms.steering import TYPICAL_MPS
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
 
 _FORCES = (0.01, 0.03, 0.1, 0.3, 1.0)
-_RUN_TIMES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
 
 
 class _Travel(Values):
@@ -69,7 +68,7 @@ def _after_other_commands(of: Evidence) -> Shapes:
 
 def _starts_of_steering(rates: Rates, history: CommandHistory, geometry: Geometry) -> Iterator[Option]:
     gain = by_steering_gain(rates, history, geometry)
-    for constant in _RUN_TIMES_S:
+    for constant in RUN_TIMES_S:
         loss = rates.covariates["speed_mps"] * np.exp(-rates.covariates["time_in_run_s"] / constant)
         yield {k: -loss[:, None] * column for k, column in gain.items()}, Values(constant)
 
