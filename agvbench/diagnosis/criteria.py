@@ -126,6 +126,8 @@ class SelectionCriteria:
         among many, and a time constant of which only a lower bound is known has no finite standard error.
     ``wald_alpha``
         Level at which the parameters of an effect must differ from their null values, with errors clustered by group.
+    ``by_likelihood_ratio``
+        Whether an effect of which Wald's test is not significant may be by the likelihood ratio, at the same level.
     ``camera_share``
         If the residuals show structure, actuators take the place of a latency of the camera unless they lose more than
         this share of its gain.
@@ -141,6 +143,7 @@ class SelectionCriteria:
     superior_share: float = 0.5
     group_by_gain: bool = False
     wald_alpha: float = 1e-4
+    by_likelihood_ratio: bool = False
     camera_share: float = 0.1
     min_gain_of_initial_steering: float = 20.0
 
@@ -339,9 +342,12 @@ DATA = DataCriteria()
 MAPS = MapCriteria()
 FIT = FitCriteria()
 SELECTION = SelectionCriteria()
-FREE_DRIVING = SelectionCriteria(min_relative_change=0.3, trimmed_share=0.0, superior_share=0.0, group_by_gain=True)
+FREE_DRIVING = SelectionCriteria(
+    min_relative_change=0.3, trimmed_share=0.0, superior_share=0.0, group_by_gain=True, by_likelihood_ratio=True
+)
 """Criteria for windows of free driving. Their residuals are mostly systematic, so that a small change of the prediction
-is no evidence; blocks of fast driving may be few, so that only one block is left out at each end."""
+is no evidence; blocks of fast driving may be few, so that only one block is left out at each end. Commands that nobody
+planned determine the parameters of an effect together rather than each."""
 
 VARIANT = VariantCriteria()
 DISCREPANCY = DiscrepancyCriteria()

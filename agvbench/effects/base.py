@@ -72,6 +72,7 @@ Hook = Callable[..., Any]
 HOOKS: Mapping[str, tuple[Stage, ...]] = {
     "arrive": (Stage.TRANSPORT,),
     "aim": (Stage.SERVO, Stage.WHEELS),
+    "adopt": (Stage.WHEELS,),
     "steer": (Stage.WHEELS,),
     "drive": (Stage.WHEELS,),
     "move": (Stage.BODY,),
@@ -136,6 +137,10 @@ class Effect:
         actuators: ``FRONT_AIM`` … ``BRAKE_LAG``, ``STEERING_INERTIA`` … ``BRAKING_LIMIT``, ``DRIVE_INERTIA``,
         ``DRIVE_BACKLASH``, ``RIGHT_RATE_RATIO``; and ``STEERING_LOAD`` … ``REAR_MOVED_TO``, which nothing else reads.
         An effect of the wheels may remember here what was commanded.
+    adopt
+        Called once where a simulation begins in motion, with the measured yaw rate in ``MEASURED_YAW_RATE`` and its
+        share in a mean with the commands in ``MEASURED_WEIGHT``; may change what the effect remembers of earlier
+        commands.
     steer
         Called at every time of evaluation, as all hooks below; may change ``FRONT`` and ``REAR``.
     drive
@@ -164,6 +169,7 @@ class Effect:
     needs_differential: ClassVar[bool] = False
     arrive: ClassVar[Hook | None] = None
     aim: ClassVar[Hook | None] = None
+    adopt: ClassVar[Hook | None] = None
     steer: ClassVar[Hook | None] = None
     drive: ClassVar[Hook | None] = None
     move: ClassVar[Hook | None] = None

@@ -81,6 +81,10 @@ START_HEADING = 79
 DRIVE_REVERSED, DRIVE_DIRECTION = range(80, 82)
 # The mean commanded speed of the last seconds [m/s], when that was known [s], and the commanded speed since then.
 DRIVE_LOAD, DRIVE_LOAD_AT, DRIVE_HELD = range(82, 85)
+# Integral part of a controller of the yaw rate [rad/s], when that was known [s], and the target since then.
+YAW_INTEGRAL, YAW_INTEGRAL_AT, YAW_TARGET = range(85, 88)
+# The yaw rate measured where a simulation begins in motion [rad/s], and its weight (0…1) beside that of the commands.
+MEASURED_YAW_RATE, MEASURED_WEIGHT = range(88, 90)
 # What the lab logged about the run, each column standardised; 0 where nothing was logged.
-LOGGED, LOGGED_COUNT = 85, 16
+LOGGED, LOGGED_COUNT = 90, 16
 SIZE = LOGGED + LOGGED_COUNT

@@ -29,6 +29,7 @@ class _Stub:
 _STUBS: Mapping[str, _Stub] = {
     "arrive": _Stub((), "t ← t + delay"),
     "aim": _Stub(("SPEED_AIM",), "v ← v (1 + gain)"),
+    "adopt": _Stub(("STEERING_LOAD",), "load ← load (1 + gain)"),
     "steer": _Stub(("FRONT", "REAR"), "δ ← δ (1 + gain)"),
     "drive": _Stub(("FRONT_SPEED", "REAR_SPEED"), "v ← v (1 + gain)"),
     "move": _Stub(("FORWARD", "LEFT"), "v ← v (1 + gain)"),

@@ -24,7 +24,10 @@ _TRACK_M = 0.4
 
 @dataclasses.dataclass(frozen=True)
 class Differential:
-    """The truth; times in s, lengths in m. ``right_wheel`` is the diameter of the right wheel over that of the left."""
+    """The truth; times in s, lengths in m. ``right_wheel`` is the diameter of the right wheel over that of the left.
+
+    A controller with integral action turns the vehicle against friction, which resists yaw rates below ``scrub_radps``.
+    """
 
     speed_gain: float = 0.9
     yaw_gain: float = 0.7
@@ -37,6 +40,8 @@ class Differential:
     right_wheel: float = 1.0
     marker_ahead_m: float = 0.1
     slip_by_speed: float = 0.0
+    scrub_radps: float = 0.0
+    integral_time_s: float = 1.0
     noise_m: float = 3e-4
     noise_rad: float = 8e-4
     frame_s: float = 0.02
@@ -66,7 +71,7 @@ def drive(truth: Differential, seconds: float, rng: np.random.Generator) -> tupl
     t = np.arange(0.0, seconds, _STEP_S)
     late_s = truth.delay_s + np.array([truth.further_speed_delay_s, 0.0])
     v_at, w_at = (np.clip(((t - s) / _COMMAND_S + 1e-9).astype(int), 0, len(v_command) - 1) for s in late_s)
-    v = w = 0.0
+    v = w = integral = 0.0
     x, y, heading = rng.uniform(-1.0, 1.0, 3)
     path = np.empty((len(t), 3))
     for k in range(len(t)):
@@ -75,7 +80,12 @@ def drive(truth: Differential, seconds: float, rng: np.random.Generator) -> tupl
         v += (v_aim - v) * (_STEP_S / truth.speed_lag_s if truth.speed_lag_s else 1.0)
         most = truth.yaw_acceleration * _STEP_S
         w += np.clip((w_aim - w) * (_STEP_S / truth.yaw_lag_s if truth.yaw_lag_s else 1.0), -most, most)
-        left, right = v - 0.5 * _TRACK_M * w, (v + 0.5 * _TRACK_M * w) * truth.right_wheel
+        turning = w
+        if truth.scrub_radps:  # proportional and integral torque, less dry friction
+            torque = w + integral
+            turning = torque - np.clip(torque, -truth.scrub_radps, truth.scrub_radps)
+            integral += (w - turning) * _STEP_S / truth.integral_time_s
+        left, right = v - 0.5 * _TRACK_M * turning, (v + 0.5 * _TRACK_M * turning) * truth.right_wheel
         forward, yaw = 0.5 * (left + right), (right - left) / _TRACK_M
         yaw /= 1.0 + truth.slip_by_speed * forward * forward
         middle = heading + 0.5 * yaw * _STEP_S

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
-from differential_vehicle import Campaign, Differential
+from differential_vehicle import COARSE, Campaign, Differential
 
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
 from agvbench.effects import effect_kinds
@@ -60,6 +62,20 @@ def test_a_late_drive_and_a_slow_rotation_are_told_apart():
     assert values["steering_lag.time_constant_s"] == pytest.approx(1.2, rel=0.05)
     errors = diagnosis.held_out.errors["position_rms_mm"]
     assert errors["after"] < 0.1 * errors["before"]
+
+
+@pytest.mark.parametrize("noisy", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_tyres_that_resist_turning_are_named_with_friction_and_integral_time(noisy):
+    hidden = {"scrub_radps": 0.3, "integral_time_s": 2.5}
+    truth = dataclasses.replace(COARSE, **hidden) if noisy else Differential(**hidden)
+    diagnosis = diagnose(Campaign(truth))
+    values = found(diagnosis)
+    assert {name.partition(".")[0] for name in values} == {"turning_resistance"}
+    share = 0.2 if noisy else 0.05
+    assert values["turning_resistance.friction_radps"] == pytest.approx(0.3, rel=share)
+    assert values["turning_resistance.integral_time_s"] == pytest.approx(2.5, rel=share)
+    errors = diagnosis.held_out.errors["heading_rms_deg"]
+    assert errors["after"] < 0.5 * errors["before"]
 
 
 @pytest.mark.parametrize("seed", range(2))

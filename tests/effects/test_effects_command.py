@@ -34,7 +34,8 @@ def test_new_writes_the_hook_that_is_asked_for(tmp_path, capsys):
     command = ["effects", "new", "made_up_by_a_test", "--dir", str(tmp_path), "--hook"]
     assert main([*command, "moves"]) == 2
     assert capsys.readouterr().err == (
-        "agvbench effects: --hook: no such hook: moves (one of: arrive, aim, steer, drive, move, drift, capture, see)\n"
+        "agvbench effects: --hook: no such hook: moves "
+        "(one of: arrive, aim, adopt, steer, drive, move, drift, capture, see)\n"
     )
     assert main([*command, "move"]) == 0
     text = (tmp_path / "made_up_by_a_test.py").read_text(encoding="utf-8")

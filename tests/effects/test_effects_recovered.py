@@ -165,7 +165,7 @@ def signatures(quiet):
         for k, p in enumerate(kind.parameters()):
             own = np.array([p.null for p in kind.parameters()])
             own[k] = p.scale
-            if p.name == "direction_rad":
+            if p.name in {"direction_rad", "integral_time_s"}:  # without the first parameter it does nothing
                 own[0] = scales[0]
             columns.append(((quiet.predict(name, own) - null) * weight).ravel())
         moved = np.column_stack(columns)

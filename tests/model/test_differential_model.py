@@ -21,6 +21,7 @@ from agvbench.effects import (
     SteeringLag,
     WheelDiameterMismatch,
 )
+from agvbench.effects.turning_resistance import TurningResistance, likely_integral
 from agvbench.effects.variants import effect_variants
 from agvbench.errors import CampaignError, VehicleError
 from agvbench.model import VehicleModel
@@ -106,6 +107,49 @@ def test_wheels_of_second_order_agree_with_dop853(lag_s: float, inertia_s: float
     zeros = np.zeros(len(times))
     ours = robot.rollout([Commands(times, *commanded.T, zeros)], [(0.0, 0.0, 0.0)], [t])[0]
     np.testing.assert_allclose(ours, expected, rtol=0.0, atol=5e-6)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    friction=st.sampled_from((0.0, 0.15, 0.6, 3.0)),
+    integral_time_s=st.sampled_from((0.3, 2.0, 20.0)),
+)
+def test_a_turning_resistance_agrees_with_a_controller_in_small_steps(
+    seed: int, friction: float, integral_time_s: float
+) -> None:
+    rng, step_s = np.random.default_rng(seed), 5e-4
+    times = np.append(0.0, np.cumsum(rng.integers(100, 4000, 6) * step_s))
+    yaw_rates = rng.choice([-0.9, -0.3, 0.0, 0.3, 0.9], 7)
+    at = np.arange(0.0, times[-1] + 3.0, step_s)
+    integral, turned = 0.0, np.zeros(len(at) + 1)
+    for k, target in enumerate(yaw_rates[np.searchsorted(times, at + 1e-9) - 1]):
+        torque = target + integral
+        yaw_rate = torque - min(max(torque, -friction), friction)
+        integral += (target - yaw_rate) * step_s / integral_time_s
+        turned[k + 1] = turned[k] + yaw_rate * step_s
+    robot = turtle().with_effects(TurningResistance(friction, integral_time_s))
+    aims = Commands(times, np.zeros(7), yaw_rates, np.zeros(7))
+    heading = robot.rollout([aims], [(0.0, 0.0, 0.0)], [at[::100]])[0][:, 2]
+    np.testing.assert_allclose(heading, turned[:-1][::100], rtol=0.0, atol=3e-3)
+
+
+@given(
+    yaw_rate=st.floats(0.01, 2.0),
+    target=st.floats(-2.0, 2.0),
+    friction=st.floats(0.01, 2.0),
+    known=st.floats(-1.0, 1.0),
+)
+def test_a_measured_yaw_rate_tells_the_integral_part(
+    yaw_rate: float, target: float, friction: float, known: float
+) -> None:
+    """A vehicle that certainly turns has overcome the friction; a measurement without weight changes nothing."""
+    integral = known * friction
+    certain = likely_integral(integral, target, yaw_rate, 1.0 - 1e-9, friction)
+    assert abs(certain) <= friction
+    if abs(yaw_rate + friction - target) <= friction:
+        assert target + certain - friction == pytest.approx(yaw_rate, abs=1e-3)
+    assert likely_integral(integral, target, yaw_rate, 0.0, friction) == pytest.approx(integral, abs=1e-12)
 
 
 def test_a_battery_of_both_wheels_slows_turns_as_the_library_s_does_not() -> None:

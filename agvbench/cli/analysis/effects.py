@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--hook",
         metavar="HOOK",
         default="drive",
-        help="arrive, aim, steer, drive, move, drift, capture or see (default: drive)",
+        help="arrive, aim, adopt, steer, drive, move, drift, capture or see (default: drive)",
     )
     new.add_argument("--dir", metavar="DIR", type=Path, help="folder to write into (default: agvbench/effects)")
 

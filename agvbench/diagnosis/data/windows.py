@@ -29,8 +29,11 @@ SUPPORT_S = 0.2
 SAMPLES = 8
 """Poses per window, evenly spaced; the last one at the horizon."""
 
-HISTORY_S = 2.0
-"""Duration of the commands before a window that are simulated for the state of its actuators [s]."""
+HISTORY_S, DIFFERENTIAL_HISTORY_S = 2.0, 20.0
+"""Duration of the commands before a window that are simulated for the state of its actuators [s].
+
+The controllers of a differential vehicle remember longer than servos do: `turning_resistance`.
+"""
 
 CONSTANT_VELOCITY_S = 0.1
 """Duration before a window over which the constant-velocity baseline averages velocity and yaw rate [s]."""
@@ -329,7 +332,8 @@ def _window(run: Run, horizon: Horizon, track: _Track, last: int) -> Window | No
     if not near[-1] or np.count_nonzero(near) < SAMPLES // 2:
         return None
     poses[~near] = np.nan
-    commands = _commands_of_window(run, t0, t0 + horizon.horizon_s)
+    history_s = DIFFERENTIAL_HISTORY_S if track.turns_on_the_spot else HISTORY_S
+    commands = _commands_between(run, t0, t0 - history_s, t0 + horizon.horizon_s)
     recent = slice(None, last + 1)
     return Window(
         replace(run, run_id=f"{run.run_id}@{t0:.2f}", commands=commands, frames=Frames.empty()),
@@ -347,13 +351,13 @@ def _window(run: Run, horizon: Horizon, track: _Track, last: int) -> Window | No
     )
 
 
-def _commands_of_window(run: Run, t0: float, end_s: float) -> Commands:
-    """Return the commands of a window and of its history.
+def _commands_between(run: Run, t0: float, begin_s: float, end_s: float) -> Commands:
+    """Return the commands of a window that begins at `t0`, and of its history from `begin_s`.
 
     The first of them counts as given long before, unless the run began at rest within the history.
     """
     c = run.commands
-    first = max(int(np.searchsorted(c.t_s, t0 - HISTORY_S, side="right")) - 1, 0)
+    first = max(int(np.searchsorted(c.t_s, begin_s, side="right")) - 1, 0)
     stop = max(int(np.searchsorted(c.t_s, end_s, side="left")), first + 1)
     t_s = c.t_s[first:stop].copy()
     if first or not np.any(run.frames.t_s < -_NEAR_S):

@@ -39,13 +39,13 @@ class OneStepEstimate:
 def initial_parameters(fitted: Fit, larger: Predictor, start: Floats) -> Floats:
     """Return the parameters (P,) at which a fit of `larger` starts, with its last effect at `start` (q,).
 
-    If all runs begin with both axles at neutral, the nodal values are converted for the added effect. Otherwise they
-    are those of `fitted`.
+    If all runs begin with both axles at neutral, or none is steered, the nodal values are converted for the added
+    effect. Otherwise they are those of `fitted`.
     """
     values, maps = fitted.parameters, larger.maps.size
-    if larger.readings.initial_states is None and not larger.readings.preset:
-        name = larger.effects[-1]
-        kind = next((kind for kind in larger.batch.kinds if kind.name == name), None) or effect_kinds()[name]
+    name = larger.effects[-1]
+    kind = next((kind for kind in larger.batch.kinds if kind.name == name), None) or effect_kinds()[name]
+    if kind.needs_differential or (larger.readings.initial_states is None and not larger.readings.preset):
         values = np.r_[larger.maps.beside(values[:maps], kind, start), values[maps:]]
     return np.asarray(np.r_[values, start])
 

@@ -20,7 +20,7 @@ from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import AnySelector, Selection, Selector
 from agvbench.effects.variants import cause_of
 
-STEERING_DYNAMICS = ("steering_lag", "steering_rate_limit", "steering_backlash")
+STEERING_DYNAMICS = ("steering_lag", "steering_rate_limit", "steering_backlash", "turning_resistance")
 
 
 def choose_initial_steering(selector: AnySelector) -> AnySelector:

@@ -10,7 +10,7 @@ from typing import ClassVar, Self, TypeVar
 import numpy as np
 
 from agvbench.diagnosis.criteria import SELECTION, SelectionCriteria
-from agvbench.diagnosis.estimation.cross_validation import differs_from_null, trimmed_gain
+from agvbench.diagnosis.estimation.cross_validation import differs_from_null, fits_better, trimmed_gain
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.residuals import pose_residuals
@@ -136,11 +136,17 @@ class Selector(FittedModels):
         An effect that is one `of_group` need not change the prediction noticeably: others of its group take its place.
         Nor need one that a prior states: the same prediction by other effects contradicts the prior.
         """
-        added, group = set(with_it.names) - set(without.names), self.batch.readings.group
+        added = set(with_it.names) - set(without.names)
         by_gain = of_group and self.criteria.group_by_gain
         return self.improves(without, with_it, of_group=of_group) and (
-            by_gain
-            or all(differs_from_null(with_it.fit, name, group) and not with_it.is_at_bound(name) for name in added)
+            by_gain or all(self._differs_from_null(without, with_it, n) and not with_it.is_at_bound(n) for n in added)
+        )
+
+    def _differs_from_null(self, without: ScoredModel, with_it: ScoredModel, name: str) -> bool:
+        """Return whether an added effect is significant, by Wald's test or by the likelihood ratio."""
+        group = self.batch.readings.group
+        return differs_from_null(with_it.fit, name, group) or (
+            self.criteria.by_likelihood_ratio and fits_better(without.fit, with_it.fit, name, group)
         )
 
     def improves(self, without: ScoredModel, with_it: ScoredModel, *, of_group: bool = False) -> bool:

@@ -36,6 +36,7 @@ from agvbench.effects.state import (
     DRIVE_START,
     DRIVE_WAIT,
     DRIVES,
+    FRONT,
     FRONT_AIM,
     FRONT_BACKLASH,
     FRONT_BEFORE,
@@ -53,6 +54,8 @@ from agvbench.effects.state import (
     HOURS,
     KNOWN_FRONT,
     LOGGED,
+    MEASURED_WEIGHT,
+    MEASURED_YAW_RATE,
     REAR_AIM,
     REAR_BACKLASH,
     REAR_BEFORE,
@@ -84,7 +87,10 @@ from agvbench.effects.state import (
     TIME,
     X_RATE,
     Y_RATE,
+    YAW_INTEGRAL,
+    YAW_INTEGRAL_AT,
     YAW_RATE,
+    YAW_TARGET,
     X,
     Y,
 )
@@ -94,7 +100,7 @@ from agvbench.model.simulation.frames import follow_seen, report_step, see_step,
 from agvbench.model.simulation.gaps import TOGETHER
 from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_ROLLED, START_SIZE, STARTED, TURN, WORK_SIZE
 from agvbench.model.simulation.level import drive_speed, front_correction, level_lift, limit_body, see_late
-from agvbench.model.simulation.stages import aim, arrive, capture
+from agvbench.model.simulation.stages import adopt, aim, arrive, capture
 from agvbench.model.simulation.step import end_step, take_step
 from agvbench.types import Floats
 
@@ -248,6 +254,8 @@ def _begin_in_motion(
     lift = level_lift(s, p, vehicle, servos, now, recent_speed, speed)
     servos[4] = drive_speed(s, p, vehicle, servos, now, speed)
     if weight > 0.0:
+        s[FRONT], s[MEASURED_YAW_RATE], s[MEASURED_WEIGHT] = servos[2], yaw_rate, weight
+        adopt(s, p)
         turned = weight * front_correction(s, p, vehicle, servos, now, yaw_rate)
         servos[0] += turned
         servos[2] += turned
@@ -270,6 +278,7 @@ def _reset_memory(s: Floats, commands: Floats, settled: Floats, first: int, head
     s[FRONT_SLIPPED] = s[REAR_SLIPPED] = 0.0
     s[DRIVE_LOAD] = s[DRIVE_LOAD_AT] = s[DRIVE_HELD] = s[DRIVE_DIRECTION] = 0.0
     s[DRIVE_REVERSED], s[START_HEADING] = -math.inf, heading
+    s[YAW_INTEGRAL] = s[YAW_INTEGRAL_AT] = s[YAW_TARGET] = 0.0
 
 
 @compiled(inner=True)

@@ -21,6 +21,11 @@ def aim(s: Floats, p: Floats) -> None:
 
 
 @compiled(inner=True)
+def adopt(s: Floats, p: Floats) -> None:
+    """Change what effects remember of the commands by the measured yaw rate with which a simulation begins."""
+
+
+@compiled(inner=True)
 def steer(s: Floats, p: Floats) -> None:
     """Change the axles' angles."""
 
