@@ -66,6 +66,8 @@ PLANTED = (
 )
 SLOW = {"warthog": {"steering_lag": {"time_constant_s": 0.8}, "mocap_latency": {"latency_s": 0.5}}}
 """Sizes for a vehicle whose poses come ten times a second."""
+OWN = {"warthog": (Planted(("turning_resistance", {"friction_radps": 0.1, "integral_time_s": 3.0})),)}
+"""What is planted in the recordings of one vehicle beside what is planted in all."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for vehicle in wanted.vehicles:
         source = Source.of(vehicle)
         sessions = len({run.session for run in source.runs})
-        for planted in PLANTED:
+        for planted in (*PLANTED, *OWN.get(vehicle, ())):
             if (planted.clock_s or planted.speed != 1.0) and sessions < 2:
                 continue
             if planted.effect and planted.effect[0] in SLOW.get(vehicle, {}):

@@ -6,6 +6,7 @@ are the cause, or its parameters, the runs then do not tell.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -22,6 +23,8 @@ from agvbench.diagnosis.selection.variants import with_extended_library
 from agvbench.effects.variants import cause_of, causes_in, effect_variants
 
 _STANDARD_ERRORS = 3.0
+_LENGTHS, _MARKERS = ("wheelbase_error", "mocap_scale"), "marker_offset"
+_TOLERANCE_M = 2e-3
 
 
 def with_equal_descriptions(selection: Selection, before: ScoredModel, selector: Selector) -> Selection:
@@ -29,7 +32,8 @@ def with_equal_descriptions(selection: Selection, before: ScoredModel, selector:
 
     `before` is the model without variants. Its effects that a variant made unnecessary are tried beside the library's
     equation. What all delays of actuators have in common is moved to the camera. A variant that combines several
-    effects is also divided into two where it is only an alternative.
+    effects is also divided into two where it is only an alternative. Lengths that the vehicle or the camera may have
+    wrong are compared with markers that are where they are known to be to 2 mm.
     """
     extended, present = with_extended_library(selector), {cause_of(name) for name in selection.chosen.names}
     removed = [name for name in before.names if cause_of(name) not in present]
@@ -43,9 +47,29 @@ def with_equal_descriptions(selection: Selection, before: ScoredModel, selector:
         known = alternatives.get(name, {})
         for variant in _combining_variants(extended, known):
             found |= _divided(extended, selection, name, variant, [])
+        found |= _lengths_but_for_markers(selection, selector, name)
         equal = {other: more for other, more in found.items() if more < SELECTION.alternative_margin}
         alternatives[name] = known | equal
     return replace(selection, alternatives=alternatives)
+
+
+def _lengths_but_for_markers(selection: Selection, selector: Selector, name: str) -> dict[str, float]:
+    """Return by how much the deviance increases with a wrong scale of the camera for a wrong wheelbase, or vice versa.
+
+    A scale also moves the markers, by a fraction of a millimetre, and nobody knows their place so well: it is compared
+    beside an offset of the markers, unless that is too large to pass unnoticed.
+    """
+    present = {cause_of(one) for one in (*selection.chosen.names, *selector.given)}
+    others = [one for one in _LENGTHS if one in selector.candidates and one not in present]
+    if name not in _LENGTHS or not others or _MARKERS in present or _MARKERS not in selector.candidates:
+        return {}
+    chosen = selection.chosen
+    model = selector.with_effect(selector.without_effect(selection.base, chosen, name), others[0])
+    model = selector.with_effect(model, _MARKERS)
+    moved = [value for key, value in model.fit.effect_values().items() if key.startswith(f"{_MARKERS}.")]
+    if not model.is_fitted or math.hypot(*moved) > _TOLERANCE_M:
+        return {}
+    return {others[0]: model.deviance - chosen.deviance}
 
 
 def _combining_variants(extended: Selector, alternatives: Mapping[str, float]) -> list[str]:
