@@ -346,8 +346,8 @@ FREE_DRIVING = SelectionCriteria(
     min_relative_change=0.3, trimmed_share=0.0, superior_share=0.0, group_by_gain=True, by_likelihood_ratio=True
 )
 """Criteria for windows of free driving. Their residuals are mostly systematic, so that a small change of the prediction
-is no evidence; blocks of fast driving may be few, so that only one block is left out at each end. Commands that nobody
-planned determine the parameters of an effect together rather than each."""
+is no evidence; blocks of fast driving may be few, so that only one block is left out at each end. Unplanned
+commands determine the parameters of an effect together rather than each."""
 
 VARIANT = VariantCriteria()
 DISCREPANCY = DiscrepancyCriteria()

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from agvbench.compiled import cached_njit
 from agvbench.effects.base import Effect, Stage, parameter
 from agvbench.effects.state import (
     FRONT,
@@ -19,13 +20,12 @@ from agvbench.effects.state import (
     YAW_INTEGRAL_AT,
     YAW_TARGET,
 )
-from agvbench.model.compiled import compiled
 from agvbench.types import Floats
 
 _LEAST_VARIANCE = 1e-6
 
 
-@compiled()
+@cached_njit(nogil=True, error_model="numpy")
 def integral_after(integral: float, target: float, friction: float, integral_time: float, elapsed: float) -> float:
     """Return the integral part `elapsed` seconds after it was `integral`, under a constant `target`, in closed form.
 
@@ -45,7 +45,7 @@ def integral_after(integral: float, target: float, friction: float, integral_tim
     return side * friction + (integral - side * friction) * math.exp(-elapsed / integral_time)
 
 
-@compiled()
+@cached_njit(nogil=True, error_model="numpy")
 def likely_integral(integral: float, target: float, yaw_rate: float, weight: float, friction: float) -> float:
     """Return the integral part, given that which results from earlier commands and the measured yaw rate.
 

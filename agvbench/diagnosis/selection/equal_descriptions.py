@@ -56,8 +56,8 @@ def with_equal_descriptions(selection: Selection, before: ScoredModel, selector:
 def _lengths_but_for_markers(selection: Selection, selector: Selector, name: str) -> dict[str, float]:
     """Return by how much the deviance increases with a wrong scale of the camera for a wrong wheelbase, or vice versa.
 
-    A scale also moves the markers, by a fraction of a millimetre, and nobody knows their place so well: it is compared
-    beside an offset of the markers, unless that is too large to pass unnoticed.
+    A scale also moves the markers, by a fraction of a millimetre. Their place is not known so well: the scale is
+    compared beside an offset of the markers, unless that is too large to pass unnoticed.
     """
     present = {cause_of(one) for one in (*selection.chosen.names, *selector.given)}
     others = [one for one in _LENGTHS if one in selector.candidates and one not in present]
