@@ -66,6 +66,13 @@ def likely_integral(integral: float, target: float, yaw_rate: float, weight: flo
     return min(max(best - target, -friction), friction)
 
 
+@cached_njit(nogil=True, error_model="numpy")
+def integral_now(state: Floats, friction: float, integral_time: float) -> float:
+    """Return the integral part at the time of the state."""
+    elapsed = state[TIME] - state[YAW_INTEGRAL_AT]
+    return integral_after(state[YAW_INTEGRAL], state[YAW_TARGET], friction, integral_time, elapsed)
+
+
 @dataclass(frozen=True)
 class TurningResistance(Effect):
     """Tyres that scrub resist turning, and a controller with integral action overcomes this after a time.
@@ -104,18 +111,14 @@ class TurningResistance(Effect):
     def aim(state: Floats, friction_radps: float, integral_time_s: float) -> None:
         """Advance the integral part to the time of a command."""
         if friction_radps != 0.0:
-            elapsed = state[TIME] - state[YAW_INTEGRAL_AT]
-            state[YAW_INTEGRAL] = integral_after(
-                state[YAW_INTEGRAL], state[YAW_TARGET], friction_radps, integral_time_s, elapsed
-            )
+            state[YAW_INTEGRAL] = integral_now(state, friction_radps, integral_time_s)
             state[YAW_INTEGRAL_AT], state[YAW_TARGET] = state[TIME], state[FRONT_AIM]
 
     @staticmethod
     def adopt(state: Floats, friction_radps: float, integral_time_s: float) -> None:
         """Let the integral part be what the measured yaw rate makes likely."""
         if friction_radps != 0.0:
-            elapsed = state[TIME] - state[YAW_INTEGRAL_AT]
-            integral = integral_after(state[YAW_INTEGRAL], state[YAW_TARGET], friction_radps, integral_time_s, elapsed)
+            integral = integral_now(state, friction_radps, integral_time_s)
             state[YAW_INTEGRAL] = likely_integral(
                 integral, state[FRONT], state[MEASURED_YAW_RATE], state[MEASURED_WEIGHT], friction_radps
             )
@@ -125,7 +128,5 @@ class TurningResistance(Effect):
     def steer(state: Floats, friction_radps: float, integral_time_s: float) -> None:
         """Turn at what the demand exceeds the friction by."""
         if friction_radps != 0.0:
-            elapsed = state[TIME] - state[YAW_INTEGRAL_AT]
-            integral = integral_after(state[YAW_INTEGRAL], state[YAW_TARGET], friction_radps, integral_time_s, elapsed)
-            demand = state[FRONT] + integral
+            demand = state[FRONT] + integral_now(state, friction_radps, integral_time_s)
             state[FRONT] = math.copysign(max(abs(demand) - friction_radps, 0.0), demand)

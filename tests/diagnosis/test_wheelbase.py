@@ -21,7 +21,7 @@ def test_a_wheelbase_that_was_measured_wrongly_is_named(tiny_campaign, error_m):
 
 
 @pytest.mark.parametrize("error_m", [0.008, -0.008])
-def test_a_scale_of_the_camera_is_a_rival_but_for_a_fraction_of_a_millimetre(tiny_campaign, error_m):
-    """A scale moves the markers, too: where precise runs tell the two apart, they tell a place that nobody measured."""
+def test_a_scale_of_the_camera_is_an_alternative_but_for_a_fraction_of_a_millimetre(tiny_campaign, error_m):
+    """A scale moves the markers, too: where precise runs tell the two apart, they tell a place that is not measured."""
     (effect,) = diagnose(tiny_campaign(Tiny(wheelbase_m=FRONT_M + REAR_M + error_m))).effects
     assert {"wheelbase_error", "mocap_scale"} <= {effect.name, *effect.confounded_with}

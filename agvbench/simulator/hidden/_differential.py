@@ -19,6 +19,7 @@ from agvbench.simulator.hidden.constants import (
     RUNOUT,
     RUNOUT_PERIOD,
     RUNOUT_PHASE,
+    SCRUB,
     TRACK,
     WHEEL_CURVATURE,
 )
@@ -35,6 +36,13 @@ def caster_rate(p: Floats, caster: float, speed: float, yaw_rate: float) -> floa
     """Return how fast the caster swivels [rad/s]: its wheel trails behind the pivot."""
     along, across = speed, CASTER_AHEAD_M * yaw_rate
     return (math.cos(caster) * across - math.sin(caster) * along) / p[CASTER_TRAIL]
+
+
+@cached_njit()
+def scrubbed(p: Floats, wanted: float, effort: float) -> float:
+    """Return the yaw rate [rad/s] that dry friction leaves of what is wanted and of the controller's `effort`."""
+    torque = wanted + effort
+    return torque - min(max(torque, -p[SCRUB]), p[SCRUB])
 
 
 @cached_njit()

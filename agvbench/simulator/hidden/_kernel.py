@@ -28,6 +28,8 @@ from agvbench.simulator.hidden.constants import (
     MARKER_LEFT,
     NEUTRAL,
     SCALE,
+    SCRUB,
+    SCRUB_INTEGRAL_S,
     SEAM_DIRECTION,
     SEAM_KICK,
     SEAM_PLACE,
@@ -76,9 +78,9 @@ _ROUNDING_S = 1e-10
     DRIVE, FRONT, REAR, AIM_WHEEL, AIM_FRONT, AIM_REAR,
     SERVO_FRONT, RATE_FRONT, SERVO_REAR, RATE_REAR, AXLE_FRONT, AXLE_REAR, WHEEL,
     STARTED, MOVING, SMOOTH_X, SMOOTH_Y, SMOOTH_HEADING, COMMANDED_DRIVE, COMMANDED_FRONT, COMMANDED_REAR,
-    RATE_WHEEL, CASTER,
-) = range(30)  # fmt: skip
-STATE_SIZE = 30
+    RATE_WHEEL, CASTER, EFFORT,
+) = range(31)  # fmt: skip
+STATE_SIZE = 31
 VARIATION_FRONT, VARIATION_REAR, VARIATION_SPEED = range(3)
 
 # Commands on their way: a ring of (when, which, value), which = 0 drive, 1 front, 2 rear.
@@ -182,6 +184,13 @@ def _step(p: Floats, state: Floats, run_variation: Floats, dt: float, out: Float
     a0 = actuators.linked(p, f0, state[AXLE_FRONT])
     a1 = actuators.linked(p, f1, a0)
     a2 = actuators.linked(p, f2, a1)
+    out[AXLE_FRONT] = a2
+    if p[SCRUB] != 0.0:
+        wanted, effort = (a0, a1, a2), state[EFFORT]
+        a0 = differential.scrubbed(p, a0, effort)
+        a1 = differential.scrubbed(p, a1, effort + h * (wanted[0] - a0) / p[SCRUB_INTEGRAL_S])
+        out[EFFORT] = effort + dt * (wanted[1] - a1) / p[SCRUB_INTEGRAL_S]
+        a2 = differential.scrubbed(p, a2, out[EFFORT])
     b0 = actuators.linked(p, r0, state[AXLE_REAR])
     b1 = actuators.linked(p, r1, b0)
     b2 = actuators.linked(p, r2, b1)
@@ -195,7 +204,7 @@ def _step(p: Floats, state: Floats, run_variation: Floats, dt: float, out: Float
     for i in range(4):
         out[X + i] = state[X + i] + dt / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
     out[SERVO_FRONT], out[RATE_FRONT], out[SERVO_REAR], out[RATE_REAR] = f2, rf2, r2, rr2
-    out[AXLE_FRONT], out[AXLE_REAR], out[WHEEL] = a2, b2, w2
+    out[AXLE_REAR], out[WHEEL] = b2, w2
     out[RATE_WHEEL] = rw2
     if p[CASTER_KICK] != 0.0:
         out[CASTER] = state[CASTER] + dt * differential.caster_rate(p, state[CASTER], w1, a1)

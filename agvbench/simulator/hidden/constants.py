@@ -48,6 +48,8 @@ NULL: dict[str, float] = {
     "drive_damping": 1.0, "course_curvature": 0.0, "caster_kick": 0.0, "caster_trail": 0.02,
     # two axles, again
     "shared_by_differential": 0.0,
+    # differential vehicles, again
+    "scrub": 0.0, "scrub_integral_s": 1.0,
 }  # fmt: skip
 """Every mechanism's constants at their null."""
 
@@ -71,6 +73,7 @@ NAMES = (*BASE, *NULL)
     DIFFERENTIAL, DRIVE_SIGN, TRACK, TURN_DROOP, DRIVE_FREQUENCY, DRIVE_DAMPING, COURSE_CURVATURE,
     CASTER_KICK, CASTER_TRAIL,
     SHARED_BY_DIFFERENTIAL,
+    SCRUB, SCRUB_INTEGRAL_S,
 ) = range(len(NAMES))  # fmt: skip
 
 

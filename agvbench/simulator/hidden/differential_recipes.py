@@ -36,6 +36,10 @@ DIFFERENTIAL = of_differential(
     library_effect(
         "yaw_acceleration_limit", {"acceleration_radps2": Size(1.0, 3.0, grows=-1)}, slew="acceleration_radps2"
     ),
+    library_effect(  # tyres scrub, and the controller of the yaw rate has an integral part
+        "turning_resistance", {"friction_radps": Size(0.10, 0.30), "integral_time_s": Size(1.0, 4.0, grows=0)},
+        scrub="friction_radps", scrub_integral_s="integral_time_s",
+    ),
     library_effect(
         "drive_dead_band", {"width": Size(0.03, 0.08)}, True, {"drive_dead": 0.0}, dead_width="width"
     ),
