@@ -6,14 +6,17 @@ explain what an effect was selected for; see Miller 2002, *Subset selection in r
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
+
+import numpy as np
 
 from agvbench.diagnosis.criteria import SELECTION, VARIANT
 from agvbench.diagnosis.selection.actuators import CAMERA
-from agvbench.diagnosis.selection.candidates import applies
+from agvbench.diagnosis.selection.candidates import applies, default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import ExcludedAlternative, Selection, Selector
-from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
+from agvbench.diagnosis.selection.variants import substituted, variant_candidates, with_extended_library
 from agvbench.effects.variants import cause_of, causes_in, effect_variants
 
 _MAX_ROUNDS = 3
@@ -136,4 +139,23 @@ def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, na
     predicted |= {v.name: extended.predicted_gain(without, v.name) for v in variants}
     likely = VARIANT.min_gain_share * gain
     models = {other: extended.with_effect(without, other) for other in sorted(predicted) if predicted[other] >= likely}
-    return {other: model for other, model in models.items() if model.is_fitted}
+    return {
+        other: _from_current(extended, current, name, model) if model.fit_gain_over(without) >= likely else model
+        for other, model in models.items()
+        if model.is_fitted
+    }
+
+
+def _from_current(extended: Selector, current: ScoredModel, name: str, model: ScoredModel) -> ScoredModel:
+    """Return `model`, or its fit from the parameters that its effects and maps have in `current`, if that is better.
+
+    Without the effect `name`, delays and lags may have moved so far that a fit does not return from there.
+    """
+    if current.is_matched_by(model):
+        return model
+    other, values = model.names[-1], model.fit.effect_values()
+    start = np.array([value for key, value in values.items() if key.partition(".")[0] == other])
+    with suppress(np.linalg.LinAlgError):  # the fit diverged
+        again = substituted(extended, current, {name}, replace(default_candidate(other), starts=start[None]))
+        return min(model, again, key=lambda one: one.deviance)
+    return model

@@ -225,7 +225,7 @@ def _swapped_models(
     swapped: list[tuple[_Replacement, ScoredModel]] = []
     for one in replacements:
         with suppress(np.linalg.LinAlgError):  # the fit diverged
-            swapped.append((one, _swapped(extended, current, {one.replaced}, _variant_candidate(one))))
+            swapped.append((one, substituted(extended, current, {one.replaced}, _variant_candidate(one))))
     least = min((model.deviance for _, model in swapped), default=math.inf)
     smaller = []
     for one, model in swapped:
@@ -236,7 +236,8 @@ def _swapped_models(
         others = [name for name in current.names if name in present and _may_be_unnecessary(name, current, model)]
         with suppress(np.linalg.LinAlgError):
             smaller += [
-                (one, _swapped(extended, current, {one.replaced, other}, _variant_candidate(one))) for other in others
+                (one, substituted(extended, current, {one.replaced, other}, _variant_candidate(one)))
+                for other in others
             ]
     return swapped + smaller
 
@@ -268,12 +269,12 @@ def _is_acceptable(model: ScoredModel, current: ScoredModel) -> bool:
     return model.gain_over(current) > SELECTION.min_gain
 
 
-def _swapped(extended: Selector, current: ScoredModel, out: set[str], variant: Candidate) -> ScoredModel:
-    """Return `current` with a variant in place of the effects `out`, fitted from its random effects."""
+def substituted(extended: Selector, current: ScoredModel, out: set[str], other: Candidate) -> ScoredModel:
+    """Return `current` with another effect or a variant in place of the effects `out`, fitted from its parameters."""
     own = current.fit.effect_values()
     kept = [value for key, value in own.items() if key.partition(".")[0] not in out]
-    names = (*(name for name in current.names if name not in out), variant.name)
-    starts = frozenset(start for start in current.starts if start[0] not in out) | variant.key
+    names = (*(name for name in current.names if name not in out), other.name)
+    starts = frozenset(start for start in current.starts if start[0] not in out) | other.key
     maps = current.fit.parameters[: extended.batch.maps.size]
     near = current.fit
     fits = [
@@ -282,7 +283,7 @@ def _swapped(extended: Selector, current: ScoredModel, out: set[str], variant: C
             random_effects=near.random_effects, variance_components=near.variance_components,
             iterations=FIT.few_steps, near=near.linear,
         )
-        for start in variant.starts
+        for start in other.starts
     ]  # fmt: skip
     best = min(fits, key=lambda one: one.total_loss)
     if best.total_loss - best.decrement > near.total_loss + VARIANT.max_fit_loss:
