@@ -35,6 +35,7 @@ from agvbench.types import Floats
 ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float]]
 """A model with a term, the term, and the gains of the effects beside it."""
 
+_COORDINATES = frozenset({"x_m", "y_m"})
 TERM_NAMES = frozenset(term.name for term in TERMS)
 
 
@@ -271,7 +272,7 @@ def best_term(
         values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
         screened = replace(kind, starts=values, screened=True, patient=start is starts[0], expected_gain=start.gain)
         model = extended.with_effect(root, start.term.name, screened)
-        if _is_constant_change(model, start.term):
+        if _is_constant_change(model, start.term) or _is_outside_the_room(model, start.term):
             continue
         if extended.meets_criterion(root, model) and (best is None or model.deviance < best[0].deviance):
             best = model, start.term
@@ -283,6 +284,14 @@ def _is_constant_change(model: ScoredModel, term: type[DiscrepancyTerm]) -> bool
     if not issubclass(term, ByCampaignTime) or not model.is_fitted:
         return False
     return is_constant(_term_values(model, term), model.fit.predictor.readings.started_h)
+
+
+def _is_outside_the_room(model: ScoredModel, term: type[DiscrepancyTerm]) -> bool:
+    """Return whether a term of a place was fitted to one at a bound: it stands for a direction on the floor."""
+    if not model.is_fitted:
+        return False
+    at_bound = np.isclose(np.abs(_term_values(model, term)), candidate(term).bounds[:, 1])
+    return any(at_bound[k] for k, p in enumerate(term.parameters()) if p.name in _COORDINATES)
 
 
 def _may_be_mimicked(selection: Selection, with_term: ScoredModel) -> bool:
@@ -301,9 +310,10 @@ def _term_in_place_of_effect(
 ) -> tuple[ScoredModel, type[DiscrepancyTerm]] | None:
     """Return the term that predicts better in the place of one of the selected effects `names`, or None.
 
-    An effect that few runs determine is fitted to them, so that no residual is left for a regression. Only terms that
-    do not depend on the position are fitted, because their simulation is as fast as that of effects. The column of a
-    term of a logged column comes from the regression only.
+    An effect that few runs determine is fitted to them, so that no residual is left for a regression. A term claims
+    that the library lacks the cause: it must fit better than the effect, too. Only terms that do not depend on the
+    position are fitted, because their simulation is as fast as that of effects. The column of a term of a logged column
+    comes from the regression only.
     """
     best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
     for name in names:
@@ -317,8 +327,8 @@ def _term_in_place_of_effect(
             if extended.predicted_gain(without, term.name) < least:
                 continue
             model = extended.with_effect(without, term.name)
-            if model.deviance < (best[0] if best else selection.chosen).deviance and extended.meets_criterion(
-                without, model
-            ):
+            is_best = best is None or model.deviance < best[0].deviance
+            gains = model.gain_over(selection.chosen) > extended.min_gain
+            if is_best and gains and extended.meets_criterion(without, model):
                 best = model, term
     return best

@@ -21,6 +21,7 @@ from types import ModuleType
 from agvbench.compiled import cache_directory, source_digest
 from agvbench.effects import HOOKS, TIME_HOOKS, Effect
 from agvbench.errors import FileError
+from agvbench.model.simulation import commands as simulation_commands
 from agvbench.model.simulation import frames as simulation_frames
 from agvbench.model.simulation import level as simulation_level
 from agvbench.model.simulation import loop as simulation_loop
@@ -28,7 +29,7 @@ from agvbench.model.simulation import stages as simulation_stages
 from agvbench.model.simulation import step as simulation_step
 
 # The files of the kernel that call stages directly or indirectly, each after those that it imports.
-_PARTS = (simulation_frames, simulation_step, simulation_level, simulation_loop)
+_PARTS = (simulation_commands, simulation_frames, simulation_step, simulation_level, simulation_loop)
 _INSIDE = {simulation_stages.__name__, *(part.__name__ for part in _PARTS)}
 _ACTUATE, _ACTUATE_ANY_ORDER = "actuate", "actuate_any_order"
 _SECOND_ORDER = {"STEERING_INERTIA", "STEERING_ACCELERATION", "COAST_SPRING", "DRIVE_INERTIA"}

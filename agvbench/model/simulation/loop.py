@@ -15,41 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.effects.state import (
-    ACCELERATE_LAG,
-    ACCELERATION_LIMIT,
-    BODY_ACCELERATION_LIMIT,
-    BODY_BRAKING_LIMIT,
-    BRAKE_LAG,
-    BRAKING_LIMIT,
-    COAST_RELAXATION,
-    COAST_SPRING,
-    CREEP_AT,
     DISTANCE,
-    DRIVE_BACKLASH,
-    DRIVE_COMMAND,
-    DRIVE_DIRECTION,
-    DRIVE_HELD,
-    DRIVE_INERTIA,
-    DRIVE_LOAD,
-    DRIVE_LOAD_AT,
-    DRIVE_REVERSED,
-    DRIVE_START,
     DRIVE_WAIT,
-    DRIVES,
     FRONT,
     FRONT_AIM,
-    FRONT_BACKLASH,
-    FRONT_BEFORE,
-    FRONT_COMMAND,
-    FRONT_CREEP,
-    FRONT_HELD,
-    FRONT_KEPT,
-    FRONT_KEPT_AT,
-    FRONT_LAGS,
-    FRONT_LAGS_AT,
-    FRONT_MOVED_TO,
-    FRONT_REVERSAL,
-    FRONT_SLIPPED,
     HEADING,
     HOURS,
     KNOWN_FRONT,
@@ -57,50 +26,27 @@ from agvbench.effects.state import (
     MEASURED_WEIGHT,
     MEASURED_YAW_RATE,
     REAR_AIM,
-    REAR_BACKLASH,
-    REAR_BEFORE,
-    REAR_COMMAND,
-    REAR_CREEP,
-    REAR_HELD,
-    REAR_KEPT,
-    REAR_KEPT_AT,
-    REAR_LAG_RATIO,
-    REAR_LAGS,
-    REAR_LAGS_AT,
-    REAR_MOVED_TO,
-    REAR_REVERSAL,
-    REAR_SLIPPED,
     REAR_WAIT,
-    RIGHT_RATE_RATIO,
     ROLLED,
     SEEN_LAG,
     SIZE,
     SPEED,
     SPEED_AIM,
-    START_HEADING,
-    STEERING_ACCELERATION,
-    STEERING_INERTIA,
-    STEERING_LAG,
-    STEERING_LOAD,
-    STEERING_LOAD_AT,
-    STEERING_RATE,
     TIME,
     X_RATE,
     Y_RATE,
-    YAW_INTEGRAL,
-    YAW_INTEGRAL_AT,
     YAW_RATE,
-    YAW_TARGET,
     X,
     Y,
 )
 from agvbench.model.compiled import compiled
 from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
+from agvbench.model.simulation.commands import next_drive, obey, reset_memory
 from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
 from agvbench.model.simulation.gaps import TOGETHER
 from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_ROLLED, START_SIZE, STARTED, TURN, WORK_SIZE
 from agvbench.model.simulation.level import drive_speed, front_correction, level_lift, limit_body, see_late
-from agvbench.model.simulation.stages import adopt, aim, arrive, capture
+from agvbench.model.simulation.stages import adopt, arrive, capture
 from agvbench.model.simulation.step import end_step, take_step
 from agvbench.types import Floats
 
@@ -113,50 +59,6 @@ _FASTEST_TURN = 150.0
 # Recent speed: averaged with weights that fall with this time constant [s].
 RECENT_SPEED_S = 0.5
 _STATE = 4
-
-
-@compiled(inner=True)
-def _last_reversal(reversal: float, before: float, now: float) -> float:
-    """Return the angle at which the last change of direction took place, for a change from `before` to `now`."""
-    return before if (now - before) * (before - reversal) < 0.0 else reversal
-
-
-@compiled(inner=True)
-def _obey(
-    s: Floats, p: Floats, commands: Floats, settled: Floats, driven: int, front: int, rear: int, lift: float, now: float
-) -> None:
-    """Put commands and aims into `s`; the `lift` of the drive level makes a driving command faster, either way.
-
-    The drive obeys the row `driven`, the servos `front` and `rear`.
-    """
-    if commands[front, 1] != s[FRONT_COMMAND]:
-        s[FRONT_BEFORE] = s[FRONT_AIM]
-        s[FRONT_REVERSAL] = _last_reversal(s[FRONT_REVERSAL], settled[front - 1, 0], settled[front, 0])
-    if commands[rear, 2] != s[REAR_COMMAND]:
-        s[REAR_BEFORE] = s[REAR_AIM]
-        s[REAR_REVERSAL] = _last_reversal(s[REAR_REVERSAL], settled[rear - 1, 1], settled[rear, 1])
-    s[DRIVE_COMMAND], s[FRONT_COMMAND], s[REAR_COMMAND] = commands[driven, 0], commands[front, 1], commands[rear, 2]
-    s[FRONT_AIM], s[REAR_AIM], s[SPEED_AIM] = settled[front, 0], settled[rear, 1], settled[driven, 2]
-    drives = 1.0 if settled[driven, 2] != 0.0 else 0.0
-    if drives > s[DRIVES]:
-        s[DRIVE_START] = now
-    s[DRIVES] = drives
-    if settled[driven, 2] * s[DRIVE_DIRECTION] < 0.0:
-        s[DRIVE_REVERSED] = now
-    if settled[driven, 2] != 0.0:
-        s[DRIVE_DIRECTION] = math.copysign(1.0, settled[driven, 2])
-    if lift != 0.0 and settled[driven, 2] != 0.0:
-        s[SPEED_AIM] = math.copysign(max(abs(settled[driven, 2]) + lift, 0.0), settled[driven, 2])
-    s[STEERING_LAG], s[STEERING_RATE], s[ACCELERATE_LAG], s[BRAKE_LAG] = 0.0, math.inf, 0.0, 0.0
-    s[FRONT_BACKLASH] = s[REAR_BACKLASH] = 0.0
-    s[RIGHT_RATE_RATIO] = 1.0
-    s[STEERING_INERTIA], s[STEERING_ACCELERATION], s[REAR_LAG_RATIO] = 0.0, math.inf, 1.0
-    s[ACCELERATION_LIMIT] = s[BRAKING_LIMIT] = math.inf
-    s[BODY_ACCELERATION_LIMIT] = s[BODY_BRAKING_LIMIT] = math.inf
-    s[COAST_SPRING], s[COAST_RELAXATION], s[DRIVE_INERTIA], s[DRIVE_BACKLASH] = 0.0, math.inf, 0.0, 0.0
-    if now > -math.inf:
-        s[TIME] = now
-    aim(s, p)
 
 
 @compiled(inner=True)
@@ -197,24 +99,6 @@ def _hold(
             turning *= max(1.0, abs(s[SPEED_AIM]) / speed)
         longest = min(vehicle[LONGEST_STEP], _TURN_PER_STEP / min(max(turning, _TURN_PER_STEP), _FASTEST_TURN))
     return k
-
-
-@compiled(inner=True)
-def _next_drive(
-    s: Floats, p: Floats, settled: Floats, command_t_s: Floats, driven: int, last: int
-) -> tuple[float, int]:
-    """Return when the drive obeys another row, and which: at a start, the one that closes the backlash."""
-    if driven == last:
-        return math.inf, driven
-    row, at_s = driven + 1, arrive(s, command_t_s[driven + 1], p) + s[DRIVE_WAIT]
-    left = s[DRIVE_BACKLASH] if settled[driven, 2] == 0.0 else 0.0
-    while left > 0.0 and settled[row, 2] != 0.0:
-        until_s = arrive(s, command_t_s[row + 1], p) + s[DRIVE_WAIT] if row < last else math.inf
-        closed_s = at_s + left / abs(settled[row, 2])
-        if closed_s <= until_s:
-            return closed_s, row
-        left, at_s, row = left - abs(settled[row, 2]) * (until_s - at_s), until_s, row + 1
-    return at_s, row
 
 
 @compiled(inner=True)
@@ -263,25 +147,6 @@ def _begin_in_motion(
 
 
 @compiled(inner=True)
-def _reset_memory(s: Floats, commands: Floats, settled: Floats, first: int, heading: float) -> None:
-    """Put into `s` what effects remember at the start of a run: there is no command before the first one."""
-    s[FRONT_COMMAND], s[REAR_COMMAND] = commands[first, 1], commands[first, 2]
-    s[FRONT_BEFORE], s[REAR_BEFORE] = settled[first, 0], settled[first, 1]
-    s[FRONT_REVERSAL], s[REAR_REVERSAL] = settled[first, 0], settled[first, 1]
-    s[FRONT_LAGS] = s[REAR_LAGS] = s[DRIVES] = 0.0
-    s[FRONT_LAGS_AT], s[REAR_LAGS_AT] = settled[first, 0], settled[first, 1]
-    s[FRONT_MOVED_TO], s[REAR_MOVED_TO] = settled[first, 0], settled[first, 1]
-    s[STEERING_LOAD] = s[STEERING_LOAD_AT] = s[FRONT_CREEP] = s[REAR_CREEP] = s[CREEP_AT] = 0.0
-    s[FRONT_HELD], s[REAR_HELD] = settled[first, 0], settled[first, 1]
-    s[FRONT_KEPT], s[REAR_KEPT] = settled[first, 0], settled[first, 1]
-    s[FRONT_KEPT_AT], s[REAR_KEPT_AT] = commands[first, 1], commands[first, 2]
-    s[FRONT_SLIPPED] = s[REAR_SLIPPED] = 0.0
-    s[DRIVE_LOAD] = s[DRIVE_LOAD_AT] = s[DRIVE_HELD] = s[DRIVE_DIRECTION] = 0.0
-    s[DRIVE_REVERSED], s[START_HEADING] = -math.inf, heading
-    s[YAW_INTEGRAL] = s[YAW_INTEGRAL_AT] = s[YAW_TARGET] = 0.0
-
-
-@compiled(inner=True)
 def _drive_run(
     s: Floats,
     p: Floats,
@@ -307,13 +172,13 @@ def _drive_run(
 ) -> None:
     """Simulate one run, whose pose is held until `begin`; commands before that move the actuators only."""
     now, lift = -math.inf, 0.0
-    _reset_memory(s, commands, settled, first, start[2])
+    reset_memory(s, commands, settled, first, start[2])
     driven = front = rear = first
     while now < math.inf:
-        _obey(s, p, commands, settled, driven, front, rear, lift, now)
+        obey(s, p, commands, settled, driven, front, rear, lift, now)
         to_front = arrive(s, command_t_s[front + 1], p) if front < last else math.inf
         to_rear = arrive(s, command_t_s[rear + 1], p) + s[REAR_WAIT] if rear < last else math.inf
-        to_drive, next_driven = _next_drive(s, p, settled, command_t_s, driven, last)
+        to_drive, next_driven = next_drive(s, p, settled, command_t_s, driven, last)
         end = min(to_front, to_rear, to_drive)
         if now == -math.inf:
             _rest(s, servos)
@@ -326,7 +191,7 @@ def _drive_run(
             if now == begin:
                 if not math.isnan(speed):
                     lift = _begin_in_motion(s, p, vehicle, servos, now, speed, recent_speed, yaw_rate, weight)
-                    _obey(s, p, commands, settled, driven, front, rear, lift, now)
+                    obey(s, p, commands, settled, driven, front, rear, lift, now)
                 if s[SEEN_LAG] > 0.0:
                     see_late(s, p, vehicle, servos, now, start)
             limit_body(s, p, vehicle, now)
