@@ -30,7 +30,6 @@ from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
 from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime
 from agvbench.effects.variants import cause_of
-from agvbench.types import Floats
 
 ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float]]
 """A model with a term, the term, and the gains of the effects beside it."""
@@ -77,7 +76,7 @@ def _with_complement(
     """
     if not issubclass(term, ByCampaignTime):
         return None
-    opposite = complement(_term_values(current, term), extended.batch.readings.started_h)
+    opposite = complement(current.values_of(term.name), extended.batch.readings.started_h)
     if opposite is None:
         return None
     kind = replace(candidate(term), starts=opposite[None], screened=True, patient=True)
@@ -283,26 +282,18 @@ def _is_constant_change(model: ScoredModel, term: type[DiscrepancyTerm]) -> bool
     """Return whether a term of campaign time was fitted to a change that is none."""
     if not issubclass(term, ByCampaignTime) or not model.is_fitted:
         return False
-    return is_constant(_term_values(model, term), model.fit.predictor.readings.started_h)
+    return is_constant(model.values_of(term.name), model.fit.predictor.readings.started_h)
 
 
 def _is_outside_the_room(model: ScoredModel, term: type[DiscrepancyTerm]) -> bool:
     """Return whether a term of a place was fitted to one at a bound: it stands for a direction on the floor."""
-    if not model.is_fitted:
-        return False
-    at_bound = np.isclose(np.abs(_term_values(model, term)), candidate(term).bounds[:, 1])
-    return any(at_bound[k] for k, p in enumerate(term.parameters()) if p.name in _COORDINATES)
+    return model.is_fitted and not _COORDINATES.isdisjoint(model.parameters_at_bound(term.name))
 
 
 def _may_be_mimicked(selection: Selection, with_term: ScoredModel) -> bool:
     """Return whether a term alone gains a noticeable share of what all effects gain, as if they only mimicked it."""
     gain = selection.base.deviance - with_term.deviance
     return gain > DISCREPANCY.min_share_of_effects * (selection.base.deviance - selection.chosen.deviance)
-
-
-def _term_values(model: ScoredModel, term: type[DiscrepancyTerm]) -> Floats:
-    own = model.fit.effect_values()
-    return np.array([own[f"{term.name}.{p.name}"] for p in term.parameters()])
 
 
 def _term_in_place_of_effect(

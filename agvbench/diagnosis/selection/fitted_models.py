@@ -70,15 +70,26 @@ class ScoredModel:
 
         The runs then do not determine it, or ask for what the effect cannot be.
         """
-        kind = effect_kinds().get(name)
-        if kind is None:
-            return False
-        values = self.fit.effect_values()
-        return any(
-            abs(values[f"{name}.{p.name}"] - bound) <= _AT_BOUND * (bounds[1] - bounds[0]) and bound != p.null
-            for p, bounds in zip(kind.parameters(), default_candidate(name).bounds, strict=True)
-            for bound in bounds
-        )
+        return name in effect_kinds() and bool(self.parameters_at_bound(name))
+
+    def parameters_at_bound(self, name: str) -> set[str]:
+        """Return the parameters of an effect or a term that lie at a bound other than null."""
+        predictor, bounds = self.fit.predictor, default_candidate(name).bounds
+        nulls = predictor.nulls[self._of_effect(name)]
+        own = [key.partition(".")[2] for key in predictor.parameter_names if key.partition(".")[0] == name]
+        return {
+            parameter
+            for parameter, value, null, ends in zip(own, self.values_of(name), nulls, bounds, strict=True)
+            for end in ends
+            if abs(value - end) <= _AT_BOUND * (ends[1] - ends[0]) and end != null
+        }
+
+    def values_of(self, name: str) -> Floats:
+        """Return the parameters (p,) of an effect or a term."""
+        return self.fit.parameters[self.fit.predictor.maps.size :][self._of_effect(name)]
+
+    def _of_effect(self, name: str) -> NDArray[np.bool_]:
+        return np.array([key.partition(".")[0] == name for key in self.fit.predictor.parameter_names])
 
     def gain_over(self, other: ScoredModel) -> float:
         """Return the gain in cross-validated deviance or in deviance of the fit, whichever is smaller.

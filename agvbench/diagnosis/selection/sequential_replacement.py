@@ -140,22 +140,20 @@ def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, na
     likely = VARIANT.min_gain_share * gain
     models = {other: extended.with_effect(without, other) for other in sorted(predicted) if predicted[other] >= likely}
     return {
-        other: _from_current(extended, current, name, model) if model.fit_gain_over(without) >= likely else model
+        other: _from_current(extended, current, name, other, model) if model.fit_gain_over(without) >= likely else model
         for other, model in models.items()
         if model.is_fitted
     }
 
 
-def _from_current(extended: Selector, current: ScoredModel, name: str, model: ScoredModel) -> ScoredModel:
-    """Return `model`, or its fit from the parameters that its effects and maps have in `current`, if that is better.
+def _from_current(extended: Selector, current: ScoredModel, name: str, other: str, model: ScoredModel) -> ScoredModel:
+    """Return the `model` with `other` in the place of `name`, or its fit from the parameters of `current`, if better.
 
     Without the effect `name`, delays and lags may have moved so far that a fit does not return from there.
     """
     if current.is_matched_by(model):
         return model
-    other, values = model.names[-1], model.fit.effect_values()
-    start = np.array([value for key, value in values.items() if key.partition(".")[0] == other])
+    near = replace(default_candidate(other), starts=model.values_of(other)[None])
     with suppress(np.linalg.LinAlgError):  # the fit diverged
-        again = substituted(extended, current, {name}, replace(default_candidate(other), starts=start[None]))
-        return min(model, again, key=lambda one: one.deviance)
+        return min(model, substituted(extended, current, {name}, near), key=lambda one: one.deviance)
     return model
