@@ -68,12 +68,12 @@ class OwnModules:
 
     def import_error(self, error: Exception, shipped: Path) -> FileError:
         """Return the error of a file, of these or in the folder `shipped`, that cannot be imported: path and line."""
-        folders = [str(shipped), str(Path(self.folder).absolute())]
+        folders = {shipped, Path(self.folder).absolute()}
         if isinstance(error, SyntaxError):
             file, line, what = error.filename or "", error.lineno, error.msg
         else:
             frames = traceback.extract_tb(error.__traceback__)
-            own = [frame for frame in frames if str(Path(frame.filename).parent) in folders] or [frames[-1]]
+            own = [frame for frame in frames if folders & {*Path(frame.filename).parents}] or [frames[-1]]
             file, line, what = own[-1].filename, own[-1].lineno, f"{type(error).__name__} {error}"
         where, remedy = f"{shown_file(file)}:{line}", f"correct it; see {self.how_to}"
         return FileError("cannot be imported", where=where, value=what, remedy=remedy)

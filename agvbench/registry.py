@@ -32,6 +32,13 @@ def classes_by_file(package: ModuleType | str, base: type[_Class]) -> list[type[
     return [cls for inside in modules_of(module) for cls in own_classes(inside, base) if not inspect.isabstract(cls)]
 
 
+def classes_in_folders(package: str, base: type[_Class]) -> list[type[_Class]]:
+    """Return the classes that `classes_by_file` finds in `package`, then those of each package directly inside it."""
+    path = importlib.import_module(package).__path__
+    inside = [info.name for info in pkgutil.iter_modules(path, f"{package}.") if info.ispkg]
+    return [cls for name in (package, *inside) for cls in classes_by_file(name, base)]
+
+
 def modules_of(package: ModuleType) -> Iterator[ModuleType]:
     """Import and yield the modules of `package`, in the order of their names; those of packages inside it are not."""
     for info in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):

@@ -1,4 +1,4 @@
-"""Registry of effects: every module of this package, or of the user's own folder, registers the effect it defines."""
+"""Registry of effects: every module of this package, its folders and the user's own folder registers its effect."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from typing import Any
 
 from agvbench.effects.base import Effect
 from agvbench.effects.declaration import check_declaration, source_of
+from agvbench.effects.variants import Variant, effect_variants
 from agvbench.errors import FileError, OneOf, VehicleError
 from agvbench.own_modules import OwnModules
-from agvbench.registry import classes_by_file, own_classes
+from agvbench.registry import classes_in_folders, own_classes
 
 OWN_EFFECTS = OwnModules("effects", "agvbench.effects", "agvbench_own_effects", "docs/how-to/write-an-effect.md")
 """Effects of the user: the files of the folder ``effects`` in the current folder that import `agvbench.effects`."""
@@ -30,7 +31,7 @@ def effect_kinds() -> Mapping[str, type[Effect]]:
         If a file cannot be imported, the class in it is incomplete, or its name is taken.
     """
     try:
-        found = classes_by_file("agvbench.effects", Effect)
+        found = [cls for cls in classes_in_folders("agvbench.effects", Effect) if not issubclass(cls, Variant)]
         own = [cls for module in OWN_EFFECTS.load() for cls in own_classes(module, Effect)]
     except Exception as error:
         raise OWN_EFFECTS.import_error(error, Path(__file__).parent) from error
@@ -62,9 +63,6 @@ def effect_from_toml(table: object, *, where: str = "effect") -> Effect:
     """
     if not isinstance(table, Mapping):
         raise VehicleError("must be a table", where=where, value=repr(table))
-    # Variants derive from classes of this package, and are therefore imported here only.
-    from agvbench.effects.variants import effect_variants
-
     kinds: dict[str, type[Effect]] = {**effect_kinds(), **effect_variants()}
     name: Any = table.get("name")
     if name is None:

@@ -29,7 +29,7 @@ from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.selection.candidates import bounds_of, candidates
 from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.effects import SteeringLag
-from agvbench.effects.steering_backlash import SteeringBacklash
+from agvbench.effects.steering.steering_backlash import SteeringBacklash
 from agvbench.types import Pose
 from agvbench.vehicle.geometry import Geometry
 

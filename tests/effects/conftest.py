@@ -16,7 +16,7 @@ def own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def kinds(library=()):
-        monkeypatch.setattr(registry, "classes_by_file", lambda *_: list(library))
+        monkeypatch.setattr(registry, "classes_in_folders", lambda *_: list(library))
         return effect_kinds.__wrapped__()
 
     yield kinds

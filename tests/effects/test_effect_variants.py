@@ -11,8 +11,8 @@ import tomli_w
 from effect_checks import check_form, check_null_hooks
 
 from agvbench.effects import effect_from_toml, effect_kinds
-from agvbench.effects.cornering_speed_loss import CorneringSpeedLoss
-from agvbench.effects.lateral_slip import LateralSlip
+from agvbench.effects.ground.cornering_speed_loss import CorneringSpeedLoss
+from agvbench.effects.ground.lateral_slip import LateralSlip
 from agvbench.effects.variants import Variant, effect_variants
 from agvbench.model import VehicleModel, example_vehicle
 from agvbench.types import Commands

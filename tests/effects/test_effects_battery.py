@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 import agvbench.effects as effects_package
 from agvbench.effects import HOOKS, Effect, effect_from_toml, effect_kinds
 from agvbench.effects.declaration import check_declaration
+from agvbench.effects.variants import effect_variants
 from agvbench.errors import VehicleError
 from agvbench.model import VehicleModel, example_vehicle
 from agvbench.model.simulation.hook_errors import check_hooks
@@ -68,9 +69,10 @@ def simulation() -> Simulation:
     return Simulation(Geometry(0.18, 0.12), NEUTRAL, [RUN])
 
 
-def test_every_file_of_the_package_adds_an_effect() -> None:
-    files = {path.stem for path in Path(effects_package.__file__).parent.glob("*.py")}
-    assert files - {"__init__", "base", "declaration", "registry", "state"} == set(KINDS)
+def test_every_file_of_the_package_adds_an_effect_or_a_variant() -> None:
+    files = {path.stem for path in Path(effects_package.__file__).parent.rglob("*.py")}
+    shared = {"__init__", "base", "declaration", "registry", "state", "variants"}
+    assert files - shared == {*KINDS, *effect_variants()}
 
 
 def test_names_and_parameters_are_the_contract() -> None:

@@ -21,7 +21,7 @@ from agvbench.effects import (
     SteeringLag,
     WheelDiameterMismatch,
 )
-from agvbench.effects.turning_resistance import TurningResistance, likely_integral
+from agvbench.effects.ground.turning_resistance import TurningResistance, likely_integral
 from agvbench.effects.variants import effect_variants
 from agvbench.errors import CampaignError, VehicleError
 from agvbench.model import VehicleModel

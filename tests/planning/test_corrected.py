@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from agvbench.effects import SteeringLag, effect_kinds
-from agvbench.effects.battery_droop import BatteryDroop
-from agvbench.effects.floor_tilt import FloorTilt
-from agvbench.effects.mocap_scale import MocapScale
+from agvbench.effects.camera.mocap_scale import MocapScale
+from agvbench.effects.electronics.battery_droop import BatteryDroop
+from agvbench.effects.ground.floor_tilt import FloorTilt
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
 from agvbench.planning import Departure, Workspace, corrected_plan, depends_on_time, load_trajectory, plan

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from agvbench.effects.battery_droop import BatteryDroop
-from agvbench.effects.lateral_slip import LateralSlip
+from agvbench.effects.electronics.battery_droop import BatteryDroop
+from agvbench.effects.ground.lateral_slip import LateralSlip
 from agvbench.model import thesis_vehicle
 from agvbench.planning import Departure, Workspace, corrected_plan, load_trajectory
 from agvbench.running.session.session import BenchSession

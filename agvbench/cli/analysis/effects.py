@@ -1,8 +1,8 @@
 """List the physical effects that a vehicle model may have, or begin a new one.
 
-An effect is one file of agvbench/effects/ or of the folder effects/ of a lab: parameters with their bounds, and hooks
-that say what it does. A new file is simulated, tested, listed and fitted without another line elsewhere. A hook that
-cannot be compiled is reported with its line.
+An effect is one file, in a folder of agvbench/effects/ or in the folder effects/ of a lab: parameters with their
+bounds, and hooks that say what it does. A new file is simulated, tested, listed and fitted without another line
+elsewhere. A hook that cannot be compiled is reported with its line.
 
 examples:
   agvbench effects                         name, stage, parameters, and the assumption that each relaxes

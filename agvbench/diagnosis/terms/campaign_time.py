@@ -219,7 +219,7 @@ class SpeedLagByCampaignTime(ByCampaignTime):
 class DriftByCampaignTime(ByCampaignTime):
     """A drift of the moving vehicle over the floor changes, such as a wind: a velocity in the floor frame · course.
 
-    Moving has the meaning of `agvbench.effects.floor_tilt.FloorTilt`.
+    Moving has the meaning of `agvbench.effects.ground.floor_tilt.FloorTilt`.
     """
 
     name: ClassVar[str] = "drift_by_campaign_time"

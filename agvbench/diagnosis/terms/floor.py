@@ -31,7 +31,7 @@ class DriftToPoint(DiscrepancyTerm):
     """The moving vehicle drifts towards a point of the room: ``mps · d / √(d² + core²)``, d the way to the point.
 
     Far away it has one speed; within ``core_m`` it falls in proportion to the distance. Moving has the meaning of
-    `agvbench.effects.floor_tilt.FloorTilt`.
+    `agvbench.effects.ground.floor_tilt.FloorTilt`.
     """
 
     name: ClassVar[str] = "drift_to_point"

@@ -1,0 +1,1 @@
+"""Effects of the camera system: markers, scale, time stamps."""

@@ -1,0 +1,1 @@
+"""Effects of the drive: how wheels follow the commanded speeds."""

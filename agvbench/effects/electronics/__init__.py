@@ -1,0 +1,1 @@
+"""Effects of the electronics: commands on their way, and the supply."""

@@ -1,0 +1,1 @@
+"""Effects of the ground: tyres, and the floor under them."""
