@@ -33,7 +33,7 @@ from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
 from agvbench.diagnosis.selection.refused_effects import with_refused_effects
 from agvbench.diagnosis.selection.sequential_replacement import excluded_by_priors, replace_sequentially
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.subsampling import refit_to_all, subsample_repeats
+from agvbench.diagnosis.selection.subsampling import refit_to_all, refit_with_heavy_tails, subsample_repeats
 from agvbench.diagnosis.selection.validation import predicts, predicts_left_out, validated, without_effects
 from agvbench.diagnosis.selection.variants import (
     candidates_for,
@@ -102,6 +102,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         self.on_progress("fitting the training and validation runs")
         known = readings.select(~selected.split.test)
         library, with_term = refit_to_all(selected.library, selected.with_term, selected.selector, known)
+        library, with_term = refit_with_heavy_tails(library, with_term, selected.selector)
         selected = replace(selected, library=library, with_term=with_term)
         return selected if with_term or not library.gains else self._with_further_effects(selected, readings)
 

@@ -7,6 +7,7 @@ from tiny_vehicle import Tiny
 
 from agvbench.diagnosis.selection.initial_steering import reconsider_initial_steering, under_other_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.diagnosis.selection.variants import prefers_other_initial_steering, with_extended_library
 
 
 def test_another_cause_decides_on_the_initial_steering_again(tiny_campaign):
@@ -26,3 +27,15 @@ def test_without_a_gain_the_initial_steering_stays(tiny_campaign):
     base = selector.base()
     slipping = Selection(base, selector.with_effect(base, "lateral_slip"), {}, {}, {}, selector.models_fitted)
     assert reconsider_initial_steering(slipping, selector) == (slipping, selector)
+
+
+def test_a_term_of_earlier_steering_decides_on_the_initial_steering(tiny_campaign):
+    """A supply that sags when servos move shows whether they moved at the first command."""
+    right = selector_of(tiny_campaign(Tiny(sag_per_rad=0.8)))
+    assert not right.batch.readings.preset
+    for selector, prefers_other in ((right, False), (under_other_initial_steering(right), True)):
+        extended = with_extended_library(selector)
+        base = extended.base()
+        assert not prefers_other_initial_steering(base, selector)
+        sagging = extended.with_effect(base, "speed_after_steering")
+        assert prefers_other_initial_steering(sagging, selector) == prefers_other

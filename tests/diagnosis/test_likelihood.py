@@ -26,7 +26,8 @@ class Readings(SimpleNamespace):
 
 
 def squares(poses):
-    context = SimpleNamespace(readings=Readings())
+    batch = SimpleNamespace(autocorrelation_time=1.0, has_heavy_tails=False)
+    context = SimpleNamespace(readings=Readings(), batch=batch)
     return objective(context, residual_of(context, poses), np.zeros((RUNS, 6)), initial_variance_components())
 
 

@@ -116,9 +116,9 @@ def terms_of(
     )
     if predictor.readings.initial_states is not None:
         logs += 6.0 * temper * (predictor.readings.seen * np.log(variance_components.growth)).sum(axis=1)
-        squares, robust_weight = student(predictor, squares)
-        blocks *= robust_weight[:, None, None]
-        gradient = np.asarray(gradient * robust_weight[:, None])
+    squares, robust_weight = student(predictor, squares)
+    blocks *= robust_weight[:, None, None]
+    gradient = np.asarray(gradient * robust_weight[:, None])
     information = Information(own, blocks, linear.count)
     return Terms(squares + logs, information, gradient, inverse, mixed, pull)
 
@@ -157,9 +157,7 @@ def objective(
     squares = temper * np.sum(e * e, axis=(1, 2)) + np.sum(
         (random_effects / priors(predictor, variance_components)) ** 2, axis=1
     )
-    if predictor.readings.initial_states is not None:
-        squares, _ = student(predictor, squares)
-    return float(squares.sum())
+    return float(student(predictor, squares)[0].sum())
 
 
 def residual_of(predictor: Predictor, poses: Floats) -> Floats:

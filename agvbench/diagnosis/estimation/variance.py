@@ -3,7 +3,8 @@
 Windows of free driving have no random effects except those of their start pose. The errors of adjacent windows are
 correlated, so that random effects of each window would absorb a cause. The errors grow with time and have heavy tails:
 on another day they may be many times as large. The likelihood of a window is therefore Student's t, with the window and
-not the sample as unit.
+not the sample as unit. That of a run is, too, where the model lacks a cause: a few runs then have errors that are many
+times as large, and would otherwise determine the parameters.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ _MIN_M, _MIN_RAD = 1e-4, 2e-4
 _START_EXTRA_M = 2e-4
 _MIN_DEVIATION = np.array([2e-4, 2e-4, 2e-4, 2e-4])
 _STUDENT_DOF = 4.0  # of the errors of windows
+_STUDENT_DOF_OF_RUNS = 8.0
 
 
 @dataclass(frozen=True)
@@ -76,15 +78,22 @@ def scale_of(variance_components: VarianceComponents) -> Floats:
 
 
 def student(predictor: Predictor, squares: Floats) -> tuple[Floats, Floats]:
-    """Return each window's loss and weight (W,) under Student's t in three dimensions, given its squared errors (W,).
+    """Return the loss and the weight of each run or window (R,) under Student's t, given its squared errors (R,).
 
-    If windows are correlated, each counts as the share 1/autocorrelation time of an independent window. Squared errors
-    and losses are those of this share.
+    Windows are in three dimensions. If they are correlated, each counts as the share 1/autocorrelation time of an
+    independent window. Squared errors and losses are those of this share. Runs are in the dimensions of their
+    independent poses. Without heavy tails, which `Batch` states, their errors are normal, and their losses the squared
+    errors.
     """
-    part = 1.0 / predictor.batch.autocorrelation_time
+    batch, part = predictor.batch, 1.0 / predictor.batch.autocorrelation_time
+    freedom, dimensions = _STUDENT_DOF, 3.0
+    if predictor.readings.initial_states is None:
+        if not batch.has_heavy_tails:
+            return squares, np.ones(len(squares))
+        freedom, dimensions = _STUDENT_DOF_OF_RUNS, 3.0 * EVIDENCE_POSES
     return (
-        part * (_STUDENT_DOF + 3.0) * np.log1p(squares / part / _STUDENT_DOF),
-        (_STUDENT_DOF + 3.0) / (_STUDENT_DOF + squares / part),
+        part * (freedom + dimensions) * np.log1p(squares / part / freedom),
+        (freedom + dimensions) / (freedom + squares / part),
     )
 
 
@@ -124,9 +133,13 @@ def update_variance_components(
         taken = np.einsum("rkcm,rmn,rkcn->rkc", by_random_effects, inner_inverse, by_random_effects, optimize=True)
         return _update_window_variance_components(predictor, residual**2 + taken, variance_components)
     count = float(seen.sum())
-    position = np.sqrt(np.sum(residual[..., :2] ** 2 * seen[..., None]) / (2.0 * count))
-    heading = np.sqrt(np.sum(residual[..., 2] ** 2 * seen) / count)
-    variance = random_effects[:, 2:] ** 2 + np.diagonal(inner_inverse, axis1=1, axis2=2)[:, 2:]
+    errors = residual * seen[..., None]
+    squares = np.sum((errors * weights(predictor, variance_components)) ** 2, axis=(1, 2))
+    squares += np.sum((random_effects / priors(predictor, variance_components)) ** 2, axis=1)
+    robust = student(predictor, squares)[1][:, None]
+    position = np.sqrt(np.sum(robust[..., None] * errors[..., :2] ** 2) / (2.0 * count))
+    heading = np.sqrt(np.sum(robust * errors[..., 2] ** 2) / count)
+    variance = robust * random_effects[:, 2:] ** 2 + np.diagonal(inner_inverse, axis1=1, axis2=2)[:, 2:]
     return VarianceComponents(
         max(float(position), _MIN_M),
         max(float(heading), _MIN_RAD),

@@ -82,8 +82,11 @@ class Batch:
     random effects. If the runs have more command levels than nodal values, the nodal values are perturbed instead
     (``by_node``). One batch serves every set of effects, including ``kinds`` outside the library.
     ``smoothness`` is the prior of the nodal values. ``nodal_deviation`` is that of `Simulation.predict`.
-    ``autocorrelation_time`` is the number of windows that are worth one independent window.
+    ``autocorrelation_time`` is the number of windows that are worth one independent window. ``has_heavy_tails`` is
+    whether the errors of runs have Student's t distribution; those of windows always do.
     """
+
+    has_heavy_tails: bool = False
 
     def __init__(
         self,
@@ -162,6 +165,12 @@ class Batch:
         """Return this batch with other priors of the effects' parameters; both share the packed runs."""
         other = copy(self)
         other.readings = replace(self.readings, priors=priors)
+        return other
+
+    def with_heavy_tails(self) -> Batch:
+        """Return this batch with heavy tails; both share the packed runs."""
+        other = copy(self)
+        other.has_heavy_tails = True
         return other
 
     def _active(self, rows_of_run: list[NDArray[np.int64]]) -> NDArray[np.int64]:

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.window_splits import thinned
 from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
+from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
 from agvbench.diagnosis.selection.with_term import TermSelection
@@ -71,3 +73,21 @@ def refit_to_all(
     terms = tuple(replace(one, without=refitted(one.without)) for one in term_selection.terms)
     without = refitted(term_selection.without)
     return both(selection), TermSelection(both(term_selection.selection), terms, without)
+
+
+def refit_with_heavy_tails(
+    selection: Selection, term_selection: TermSelection | None, selector: Selector
+) -> tuple[Selection, TermSelection | None]:
+    """Refit the chosen model with heavy tails to the runs to which it is fitted, if it lacks fit.
+
+    A model that lacks a cause is far from a few runs. With normal errors these would determine its parameters, at the
+    expense of all runs that it does describe.
+    """
+    found = term_selection.selection if term_selection else selection
+    if not has_lack_of_fit(found.chosen):
+        return selection, term_selection
+    names, fitted = found.chosen.names, found.chosen.fit
+    robust = selector.for_batch(fitted.predictor.batch.with_heavy_tails())
+    begun = replace(fitted, predictor=Predictor(robust.batch, names))
+    found = replace(found, chosen=robust.score(names, fitted.parameters, begun, patient=True))
+    return (selection, replace(term_selection, selection=found)) if term_selection else (found, None)

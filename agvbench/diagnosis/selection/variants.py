@@ -15,7 +15,7 @@ from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, applies, bounds_of, candidate, candidates
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
-from agvbench.diagnosis.selection.initial_steering import STEERING_DYNAMICS, under_other_initial_steering
+from agvbench.diagnosis.selection.initial_steering import under_other_initial_steering
 from agvbench.diagnosis.selection.stepwise import AnySelector, Selection, Selector
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect
@@ -23,6 +23,8 @@ from agvbench.effects.variants import Variant, cause_of, effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 from agvbench.vehicle.geometry import Geometry
+
+_SAME_POSE = 1e-9
 
 EXTENDED_LIBRARY: tuple[type[Effect], ...] = (*effect_variants().values(), *TERMS)
 """Variants and discrepancy terms: the extended library. One simulation contains all, because compiling is slow.
@@ -156,10 +158,15 @@ def select_variants_and_reconsider(selection: Selection, selector: Selector) -> 
 
 
 def prefers_other_initial_steering(chosen: ScoredModel, selector: Selector) -> bool:
-    """Return whether a model with slow steering predicts clearly better under the other initial steering."""
-    if not {*STEERING_DYNAMICS} & {cause_of(name) for name in chosen.names}:
-        return False
+    """Return whether a model that depends on the initial steering predicts clearly better under the other one.
+
+    Slow steering depends on it, and so does every term of what the steering did before.
+    """
     there = under_other_initial_steering(with_extended_library(selector))
+    fitted = chosen.fit
+    poses = Predictor(there.batch, chosen.names).predict(fitted.parameters)
+    if np.allclose(poses, fitted.predictor.predict(fitted.parameters), rtol=0.0, atol=_SAME_POSE, equal_nan=True):
+        return False
     return there.score(chosen.names, chosen.fit.parameters, None).deviance < chosen.deviance - SELECTION.min_gain
 
 
