@@ -102,9 +102,12 @@ class RunsFromRest(Method[SelectedFromRest]):
         self.on_progress("fitting the training and validation runs")
         known = readings.select(~selected.split.test)
         library, with_term = refit_to_all(selected.library, selected.with_term, selected.selector, known)
-        library, with_term = refit_with_heavy_tails(library, with_term, selected.selector)
         selected = replace(selected, library=library, with_term=with_term)
-        return selected if with_term or not library.gains else self._with_further_effects(selected, readings)
+        if library.gains and not with_term:
+            selected = self._with_further_effects(selected, readings)
+        # Losses with heavy tails cannot be compared with others: nothing is selected after this fit.
+        library, with_term = refit_with_heavy_tails(selected.library, selected.with_term, selected.selector)
+        return replace(selected, library=library, with_term=with_term)
 
     @staticmethod
     def _with_further_effects(selected: SelectedFromRest, readings: Readings) -> SelectedFromRest:

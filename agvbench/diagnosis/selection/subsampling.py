@@ -89,5 +89,8 @@ def refit_with_heavy_tails(
     names, fitted = found.chosen.names, found.chosen.fit
     robust = selector.for_batch(fitted.predictor.batch.with_heavy_tails())
     begun = replace(fitted, predictor=Predictor(robust.batch, names))
-    found = replace(found, chosen=robust.score(names, fitted.parameters, begun, patient=True))
+    try:
+        found = replace(found, chosen=robust.score(names, fitted.parameters, begun, patient=True))
+    except np.linalg.LinAlgError:
+        return selection, term_selection  # the fit diverged
     return (selection, replace(term_selection, selection=found)) if term_selection else (found, None)
