@@ -48,8 +48,9 @@ Levels = dict[tuple[int, float], float]
 Mechanism = Callable[[Sequence[float]], dict[str, float]]
 
 
+@np.errstate(over="ignore")
 def rms(residual: Floats) -> float:
-    """Return the rms length of poses' differences, shape (n, 3) [m]."""
+    """Return the rms length of poses' differences, shape (n, 3) [m]; infinite if a drive is unstable."""
     return float(np.sqrt(np.mean(np.sum(residual**2, axis=1))))
 
 
