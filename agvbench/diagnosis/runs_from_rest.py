@@ -77,7 +77,9 @@ class RunsFromRest(Method[SelectedFromRest]):
 
     def read(self, runs: Sequence[Run]) -> Readings:
         """Return the poses of the runs, and the priors of the vehicle file."""
-        return replace(read_runs(runs, self.context.header.neutral), priors=self.context.priors)
+        header = self.context.header
+        readings = read_runs(runs, header.neutral, turns_on_the_spot=header.geometry.is_differential)
+        return replace(readings, priors=self.context.priors)
 
     def insufficient_data(self, readings: Readings) -> str:
         """Return why the campaign cannot be diagnosed, or an empty string."""

@@ -165,7 +165,8 @@ def _kept(campaign: Campaign, seed: int) -> Iterator[Run]:
     if any(run.split for run in runs):
         yield from runs
         return
-    readings = read_runs(runs, campaign.header.neutral)
+    header = campaign.header
+    readings = read_runs(runs, header.neutral, turns_on_the_spot=header.geometry.is_differential)
     split = split_runs(readings.runs, readings.group, campaign.header.neutral, seed)
     names = dict(zip((run.run_id for run in readings.runs), split.names, strict=True))
     for run in runs:

@@ -8,7 +8,6 @@ from tiny_vehicle import HEADER
 
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.context import DiagnosisContext
-from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.runs_from_rest import RunsFromRest
 from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.types import Run
@@ -17,4 +16,4 @@ from agvbench.types import Run
 def selector_of(runs: Iterable[Run], header: HeaderLike = HEADER) -> Selector:
     """Return the selector of a diagnosis of all `runs`."""
     method = RunsFromRest(DiagnosisContext(header, header.geometry, None, 0), lambda line: None)
-    return method.selector(read_runs(list(runs), header.neutral))
+    return method.selector(method.read(list(runs)))

@@ -38,20 +38,24 @@ def shift_commands_half_a_row(run: Run) -> Run:
     return replace(run, commands=replace(run.commands, t_s=np.maximum.accumulate(t_s)))
 
 
-def first_drive_s(run: Run, neutral: Command) -> float:
-    """Return the time of the first drive command other than neutral; ∞ if there is none."""
-    driven = np.flatnonzero(run.commands.drive != neutral.drive)
+def first_drive_s(run: Run, neutral: Command, *, turns_on_the_spot: bool = False) -> float:
+    """Return the time of the first command under which the vehicle moves; ∞ if there is none.
+
+    A vehicle that `turns_on_the_spot` moves by its front command, too.
+    """
+    turned = turns_on_the_spot & (run.commands.front != neutral.front)
+    driven = np.flatnonzero((run.commands.drive != neutral.drive) | turned)
     return float(run.commands.t_s[driven[0]]) if len(driven) else np.inf
 
 
-def starts_at_rest(run: Run, neutral: Command) -> bool:
+def starts_at_rest(run: Run, neutral: Command, *, turns_on_the_spot: bool = False) -> bool:
     """Return whether the vehicle was at rest in the last frames before its first drive command.
 
     The camera's clock may be early by up to 0.2 s. If there are no such frames, a run with few commands is taken to
     start at rest. A run whose commands change continually is taken for a piece of free driving.
     """
     usable = run.frames.select(run.frames.tracked.astype(np.bool_))
-    for until in dict.fromkeys((0.0, first_drive_s(run, neutral))):
+    for until in dict.fromkeys((0.0, first_drive_s(run, neutral, turns_on_the_spot=turns_on_the_spot))):
         frames = usable.select(usable.t_s <= until)
         if len(frames) >= 2:
             earlier = frames.select(frames.t_s <= frames.t_s[-1] - _EARLY_S)
@@ -74,7 +78,9 @@ def _halves(half: int) -> tuple[slice, slice]:
     return slice(0, half), slice(-half, None)
 
 
-def initial_pose(run: Run, frames: Frames, neutral: Command | None) -> tuple[Floats, Floats]:
+def initial_pose(
+    run: Run, frames: Frames, neutral: Command | None, *, turns_on_the_spot: bool = False
+) -> tuple[Floats, Floats]:
     """Return the pose at rest at the start (3,) [m, m, rad] and its standard errors (3,), from cleaned `frames`.
 
     Raises
@@ -82,7 +88,7 @@ def initial_pose(run: Run, frames: Frames, neutral: Command | None) -> tuple[Flo
     FitError
         If there is no pose before the first drive command nor within 0.1 s after it.
     """
-    drive_s = 0.0 if neutral is None else first_drive_s(run, neutral)
+    drive_s = 0.0 if neutral is None else first_drive_s(run, neutral, turns_on_the_spot=turns_on_the_spot)
     # Cleaning may remove the frames at rest if the pose jumps at the start: they count all the same.
     seen_s = run.frames.t_s[run.frames.tracked.astype(np.bool_)]
     before = int(np.count_nonzero(seen_s <= 0.0))

@@ -127,11 +127,12 @@ class Readings:
         return np.zeros(len(self)) if self.initial_states is None else self.initial_states.t_s
 
 
-def read_runs(runs: Iterable[Run], neutral: Command | None = None) -> Readings:
+def read_runs(runs: Iterable[Run], neutral: Command | None = None, *, turns_on_the_spot: bool = False) -> Readings:
     """Clean, sample and group runs; ``refused`` lists the runs that cannot be used.
 
-    If `neutral` is given, a vehicle counts as at rest while its drive command is neutral. This supplies the initial
-    pose of runs without frames before their first command.
+    If `neutral` is given, a vehicle counts as at rest while its drive command is neutral, and one that
+    `turns_on_the_spot` while its front command is, too. This supplies the initial pose of runs without frames before
+    their first command.
     """
     every = [shift_commands_half_a_row(run) for run in with_common_levels(list(runs))]
     began = session_starts(every)
@@ -140,7 +141,7 @@ def read_runs(runs: Iterable[Run], neutral: Command | None = None) -> Readings:
     refused: dict[str, str] = {}
     for run in every:
         try:
-            rows.append(_read(run, neutral))
+            rows.append(_read(run, neutral, turns_on_the_spot=turns_on_the_spot))
         except FitError as error:
             refused[run.run_id] = str(error).removeprefix(f"{run.run_id}: ")
         else:
@@ -191,13 +192,13 @@ def read_windows(
     return Readings(cut, t_s, poses, start, stderr, started_h, group, refused, initial_states, logged=logged)
 
 
-def _read(run: Run, neutral: Command | None) -> tuple[Floats, Floats, Floats, Floats]:
+def _read(run: Run, neutral: Command | None, *, turns_on_the_spot: bool) -> tuple[Floats, Floats, Floats, Floats]:
     if not run.is_ok:
         raise FitError(run.status)
     frames = _in_order(run)
     if len(frames) < _MIN_FRAMES or not len(run.commands):
         raise FitError("too few frames", value=len(frames), limit=f"at least {_MIN_FRAMES}")
-    start, stderr = initial_pose(run, frames, neutral)
+    start, stderr = initial_pose(run, frames, neutral, turns_on_the_spot=turns_on_the_spot)
     t_s, poses = _sampled(frames, np.linspace(0.0, float(frames.t_s[-1]), SAMPLES + 1)[1:])
     if np.count_nonzero(np.isfinite(poses[:, 0])) < _MIN_SAMPLES:
         raise FitError("too much of the run was not seen")

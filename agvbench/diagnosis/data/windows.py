@@ -118,7 +118,8 @@ def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
     if header.prediction_horizon_s is not None:
         return Horizon(header.prediction_horizon_s, header.prediction_stride_s or header.prediction_horizon_s)
     usable = [run for run in runs if run.is_ok and len(run.frames)]
-    resting = sum(starts_at_rest(run, header.neutral) for run in usable)
+    turns = header.geometry.is_differential
+    resting = sum(starts_at_rest(run, header.neutral, turns_on_the_spot=turns) for run in usable)
     return Horizon() if usable and resting < 0.5 * len(usable) else None
 
 

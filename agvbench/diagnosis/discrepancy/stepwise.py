@@ -34,6 +34,7 @@ from agvbench.effects.variants import cause_of
 ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float]]
 """A model with a term, the term, and the gains of the effects beside it."""
 
+_MAX_STARTS = 8
 _COORDINATES = frozenset({"x_m", "y_m"})
 TERM_NAMES = frozenset(term.name for term in TERMS)
 
@@ -251,14 +252,35 @@ def add_term_and_reconsider(
 
 
 def screened_terms(extended: Selector, root: ScoredModel) -> list[Start]:
-    """Return initial values of the terms with the largest predicted gains beside `root`, the best first."""
+    """Return initial values of the terms with the largest predicted gains beside `root`, the best first.
+
+    Noise of the poses hides from rates a small bias that lasts for whole runs. If no term is found in the rates of a
+    model that lacks fit, the poses decide.
+    """
     batch = extended.batch
     poses = root.fit.predictor.predict(root.fit.parameters)
     rates = residual_rates(batch.readings, poses)
     history = command_history(batch, root.fit.parameters, rates)
     starts = screen(rates, history, batch.geometry, batch.readings.group, extended.seed)
     least = max(DISCREPANCY.min_predicted_gain, DISCREPANCY.min_share_of_best_start * starts[0].gain) if starts else 0.0
-    return [start for start in starts if start.gain > least][: DISCREPANCY.max_starts]
+    starts = [start for start in starts if start.gain > least] or _linearised_terms(extended, root)
+    return starts[: DISCREPANCY.max_starts]
+
+
+def _linearised_terms(extended: Selector, root: ScoredModel) -> list[Start]:
+    """Return the terms that gain by a linearisation beside a model that lacks fit, the largest predicted gain first.
+
+    Terms of many parameters are left out: their initial values are a matter of regression.
+    """
+    if not has_lack_of_fit(root):
+        return []
+    starts = []
+    for term in TERMS:
+        values = candidate(term).starts
+        if len(values) <= _MAX_STARTS and applies(term, extended.batch.geometry):
+            starts.append(Start(term, values, extended.predicted_gain(root, term.name)))
+    likely = [start for start in starts if start.gain > extended.min_gain]
+    return sorted(likely, key=lambda start: -start.gain)
 
 
 def best_term(
