@@ -10,11 +10,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agvbench.errors import FitError
 from agvbench.signals import MAD_TO_STD
 from agvbench.statistics.rest_poses import SPEED_LIMIT_MPS, start_pose
-from agvbench.types import Command, Floats, Frames, Run
+from agvbench.types import Command, Commands, Floats, Frames, Run
 
 _LAST_S, _EARLY_S = 0.2, 0.2
 _STANDSTILL_M = 0.005
@@ -38,13 +39,15 @@ def shift_commands_half_a_row(run: Run) -> Run:
     return replace(run, commands=replace(run.commands, t_s=np.maximum.accumulate(t_s)))
 
 
-def first_drive_s(run: Run, neutral: Command, *, turns_on_the_spot: bool = False) -> float:
-    """Return the time of the first command under which the vehicle moves; ∞ if there is none.
+def is_driven(commands: Commands, neutral: Command, *, turns_on_the_spot: bool) -> NDArray[np.bool_]:
+    """Return whether the vehicle moves under each command (n,): one that `turns_on_the_spot` also by the front one."""
+    turned = turns_on_the_spot & (commands.front != neutral.front)
+    return np.asarray((commands.drive != neutral.drive) | turned)
 
-    A vehicle that `turns_on_the_spot` moves by its front command, too.
-    """
-    turned = turns_on_the_spot & (run.commands.front != neutral.front)
-    driven = np.flatnonzero((run.commands.drive != neutral.drive) | turned)
+
+def first_drive_s(run: Run, neutral: Command, *, turns_on_the_spot: bool = False) -> float:
+    """Return the time of the first command under which the vehicle moves; ∞ if there is none."""
+    driven = np.flatnonzero(is_driven(run.commands, neutral, turns_on_the_spot=turns_on_the_spot))
     return float(run.commands.t_s[driven[0]]) if len(driven) else np.inf
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from agvbench.calibration import inspect_frames
 from agvbench.calibration.campaign_protocol import HeaderLike
-from agvbench.diagnosis.data.initial_pose import starts_at_rest, unwrapped_poses
+from agvbench.diagnosis.data.initial_pose import is_driven, starts_at_rest, unwrapped_poses
 from agvbench.diagnosis.data.motion_filter import MotionFilter, MotionStates
 from agvbench.errors import FitError
 from agvbench.model.simulation.loop import RECENT_SPEED_S
@@ -320,7 +320,7 @@ def _stands(window: Window, neutral: Command, *, turns_on_the_spot: bool) -> boo
     """Return whether the vehicle stands at the beginning of a window, and is commanded to."""
     c = window.run.commands
     recent = c.t_s > window.t0_s - SUPPORT_S
-    moved = np.any(c.drive[recent] != neutral.drive) or (turns_on_the_spot and np.any(c.front[recent] != neutral.front))
+    moved = np.any(is_driven(c, neutral, turns_on_the_spot=turns_on_the_spot)[recent])
     return bool(abs(window.speed_mps) < SPEED_LIMIT_MPS and not moved)
 
 

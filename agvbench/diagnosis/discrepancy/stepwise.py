@@ -275,12 +275,17 @@ def _linearised_terms(extended: Selector, root: ScoredModel) -> list[Start]:
     if not has_lack_of_fit(root):
         return []
     starts = []
-    for term in TERMS:
+    for term in _terms_without_regression(extended):
         values = candidate(term).starts
-        if len(values) <= _MAX_STARTS and applies(term, extended.batch.geometry):
+        if len(values) <= _MAX_STARTS:
             starts.append(Start(term, values, extended.predicted_gain(root, term.name)))
     likely = [start for start in starts if start.gain > extended.min_gain]
     return sorted(likely, key=lambda start: -start.gain)
+
+
+def _terms_without_regression(extended: Selector) -> list[type[DiscrepancyTerm]]:
+    """Return the terms that this vehicle can have, without those whose logged column only a regression can choose."""
+    return [term for term in TERMS if not issubclass(term, ByLoggedColumn) and applies(term, extended.batch.geometry)]
 
 
 def best_term(
@@ -325,17 +330,15 @@ def _term_in_place_of_effect(
 
     An effect that few runs determine is fitted to them, so that no residual is left for a regression. A term claims
     that the library lacks the cause: it must fit better than the effect, too. Only terms that do not depend on the
-    position are fitted, because their simulation is as fast as that of effects. The column of a term of a logged column
-    comes from the regression only.
+    position are fitted, because their simulation is as fast as that of effects.
     """
     best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
     for name in names:
         without = extended.without_effect(selection.base, selection.chosen, name)
         # What is predicted is a gain of the fit, and not a cross-validated one.
         least = DISCREPANCY.min_share_of_effects * selection.chosen.fit_gain_over(without)
-        for term in TERMS:
-            is_slow = term.longest_step_s < math.inf
-            if is_slow or issubclass(term, ByLoggedColumn) or not applies(term, extended.batch.geometry):
+        for term in _terms_without_regression(extended):
+            if term.longest_step_s < math.inf:
                 continue
             if extended.predicted_gain(without, term.name) < least:
                 continue

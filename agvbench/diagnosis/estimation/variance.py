@@ -134,9 +134,11 @@ def update_variance_components(
         return _update_window_variance_components(predictor, residual**2 + taken, variance_components)
     count = float(seen.sum())
     errors = residual * seen[..., None]
-    squares = np.sum((errors * weights(predictor, variance_components)) ** 2, axis=(1, 2))
-    squares += np.sum((random_effects / priors(predictor, variance_components)) ** 2, axis=1)
-    robust = student(predictor, squares)[1][:, None]
+    robust = np.ones((len(seen), 1))
+    if predictor.batch.has_heavy_tails:
+        squares = np.sum((errors * weights(predictor, variance_components)) ** 2, axis=(1, 2))
+        squares += np.sum((random_effects / priors(predictor, variance_components)) ** 2, axis=1)
+        robust = student(predictor, squares)[1][:, None]
     position = np.sqrt(np.sum(robust[..., None] * errors[..., :2] ** 2) / (2.0 * count))
     heading = np.sqrt(np.sum(robust * errors[..., 2] ** 2) / count)
     variance = robust * random_effects[:, 2:] ** 2 + np.diagonal(inner_inverse, axis1=1, axis2=2)[:, 2:]

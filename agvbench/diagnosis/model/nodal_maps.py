@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.data.initial_pose import is_driven
 from agvbench.effects import Effect
 from agvbench.types import Command, Floats, Run
 
@@ -142,7 +143,7 @@ def _driven_commands(runs: Sequence[Run], role: str, neutral: Command, *, on_the
     commands, held_s = [], []
     for run in runs:
         values, t_s = getattr(run.commands, role), run.commands.t_s
-        driven = (run.commands.drive != neutral.drive) | (on_the_spot & (run.commands.front != neutral.front))
+        driven = is_driven(run.commands, neutral, turns_on_the_spot=on_the_spot)
         # A row begins where any command changes, so that one command may be held over many rows.
         changes = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
         ends_s = np.append(t_s[changes[1:]], max(float(np.max(run.frames.t_s, initial=-np.inf)), t_s[-1]))
