@@ -16,16 +16,23 @@ pytestmark = pytest.mark.slow
 WRONG_DISTANCES = Tiny(wheelbase_m=FRONT_M + REAR_M + 0.006, marker_forward_m=0.01)
 
 
-def alternatives(tiny: Tiny, variant: str, *before: str, known: tuple[str, ...] = ()) -> dict[str, float]:
-    """Return the alternatives of an effect that took the place of the effects `before`, beside the `known` ones."""
+def alternatives(
+    tiny: Tiny, variant: str, *before: str, known: tuple[str, ...] = (), beside: tuple[str, ...] = ()
+) -> dict[str, float]:
+    """Return the alternatives of an effect that took the place of the effects `before`, beside the `known` ones.
+
+    The model has the effects `beside` as well.
+    """
     selector = selector_of(campaign_runs(tiny))
     extended = with_extended_library(selector)
     base = larger = extended.base()
+    for name in beside:
+        base = larger = extended.with_effect(base, name)
     for name in before:
         larger = extended.with_effect(larger, name)
     chosen = extended.with_effect(base, variant)
     gains = {variant: base.deviance - chosen.deviance}
-    selection = Selection(base, chosen, {variant: dict.fromkeys(known, 0.0)}, gains, {}, 0)
+    selection = Selection(extended.base(), chosen, {variant: dict.fromkeys(known, 0.0)}, gains, {}, 0)
     return with_equal_descriptions(selection, larger, selector).alternatives.get(variant, {})
 
 
@@ -58,3 +65,8 @@ def test_two_wrong_distances_may_stand_for_a_coupling_of_the_axles():
 
 def test_without_displaced_markers_among_its_alternatives_a_coupling_is_not_divided():
     assert alternatives(WRONG_DISTANCES, "axle_coupling") == {}
+
+
+def test_lengths_are_compared_beside_a_variant_of_another_effect():
+    tiny = Tiny(wheelbase_m=FRONT_M + REAR_M + 0.006, play_rad=0.03)
+    assert "mocap_scale" in alternatives(tiny, "wheelbase_error", beside=("steering_backlash_uneven",))

@@ -47,25 +47,25 @@ def with_equal_descriptions(selection: Selection, before: ScoredModel, selector:
         known = alternatives.get(name, {})
         for variant in _combining_variants(extended, known):
             found |= _divided(extended, selection, name, variant, [])
-        found |= _lengths_but_for_markers(selection, selector, name)
+        found |= _lengths_but_for_markers(extended, selection, name)
         equal = {other: more for other, more in found.items() if more < SELECTION.alternative_margin}
         alternatives[name] = known | equal
     return replace(selection, alternatives=alternatives)
 
 
-def _lengths_but_for_markers(selection: Selection, selector: Selector, name: str) -> dict[str, float]:
+def _lengths_but_for_markers(extended: Selector, selection: Selection, name: str) -> dict[str, float]:
     """Return by how much the deviance increases with a wrong scale of the camera for a wrong wheelbase, or vice versa.
 
     A scale also moves the markers, by a fraction of a millimetre. Their place is not known so well: the scale is
     compared beside an offset of the markers, unless that is too large to pass unnoticed.
     """
-    present = {cause_of(one) for one in (*selection.chosen.names, *selector.given)}
-    others = [one for one in _LENGTHS if one in selector.candidates and one not in present]
-    if name not in _LENGTHS or not others or _MARKERS in present or _MARKERS not in selector.candidates:
+    present = {cause_of(one) for one in (*selection.chosen.names, *extended.given)}
+    others = [one for one in _LENGTHS if one in extended.candidates and one not in present]
+    if name not in _LENGTHS or not others or _MARKERS in present or _MARKERS not in extended.candidates:
         return {}
     chosen = selection.chosen
-    model = selector.with_effect(selector.without_effect(selection.base, chosen, name), others[0])
-    model = selector.with_effect(model, _MARKERS)
+    model = extended.with_effect(extended.without_effect(selection.base, chosen, name), others[0])
+    model = extended.with_effect(model, _MARKERS)
     moved = [value for key, value in model.fit.effect_values().items() if key.startswith(f"{_MARKERS}.")]
     if not model.is_fitted or math.hypot(*moved) > _TOLERANCE_M:
         return {}
