@@ -128,9 +128,12 @@ class RunsFromRest(Method[SelectedFromRest]):
         if not every.is_improvable(begun):
             return selected
         again = replace(every.select(begun, map(cause_of, begun.names)), excluded=library.excluded)
-        without, with_it = (
-            trained.score(model.names, model.fit.parameters, None) for model in (library.chosen, again.chosen)
-        )
+        try:
+            without, with_it = (
+                trained.score(model.names, model.fit.parameters, None) for model in (library.chosen, again.chosen)
+            )
+        except np.linalg.LinAlgError:
+            return selected  # the training runs alone do not determine them
         if not predicts(with_it, without, readings.select(selected.split.validation)):
             return selected
         return replace(selected, library=with_other_forms(with_known_alternatives(again, library), every))
@@ -236,9 +239,7 @@ class RunsFromRest(Method[SelectedFromRest]):
         tried, kinds = candidates_for(context.vehicle, context.geometry)
         batch = Batch(readings, maps, context.geometry, kinds=kinds)
         given = given_effects(context.vehicle, tried)
-        selector = Selector(batch, tried, start, context.seed, self.on_progress, *given)
-        # A differential vehicle that stands has no yaw rate: nothing could have been set before.
-        return selector if geometry.is_differential else choose_initial_steering(selector)
+        return choose_initial_steering(Selector(batch, tried, start, context.seed, self.on_progress, *given))
 
 
 def _prior_values(maps: NodalMaps, context: DiagnosisContext) -> dict[str, Floats]:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 from tiny_selector import selector_of
 from tiny_vehicle import Tiny
 
 from agvbench.diagnosis.selection.initial_steering import reconsider_initial_steering, under_other_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.diagnosis.selection.validation import predicts
 from agvbench.diagnosis.selection.variants import prefers_other_initial_steering, with_extended_library
 
 
@@ -39,3 +43,14 @@ def test_a_term_of_earlier_steering_decides_on_the_initial_steering(tiny_campaig
         assert not prefers_other_initial_steering(base, selector)
         sagging = extended.with_effect(base, "speed_after_steering")
         assert prefers_other_initial_steering(sagging, selector) == prefers_other
+
+
+def test_validation_runs_have_the_initial_steering_of_the_model(tiny_campaign):
+    """The axles of a slow steering stood at their first command: runs with that command alone show no lag."""
+    selector = selector_of(tiny_campaign(Tiny(steering_lag_s=0.3, is_preset=True)))
+    assert selector.batch.readings.preset
+    base = selector.base()
+    lag = selector.with_effect(base, "steering_lag")
+    as_read = replace(selector.batch.readings, preset=False)
+    held = as_read.select(np.array([run.experiment.startswith("steering_") for run in as_read.runs]))
+    assert predicts(lag, base, held)

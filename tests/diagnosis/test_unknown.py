@@ -18,7 +18,7 @@ from agvbench.diagnosis.discrepancy.campaign_time import by_axle_angles
 from agvbench.diagnosis.discrepancy.regression import FOLDS, GroupedRegression
 from agvbench.diagnosis.discrepancy.screening import Start, screen
 from agvbench.diagnosis.discrepancy.shapes import Evidence, every_shape
-from agvbench.diagnosis.residuals.body_rates import Rates
+from agvbench.diagnosis.residuals.body_rates import LoggedSteps, Rates
 from agvbench.diagnosis.residuals.covariate_test import RANDOM_PHASE, dependences
 from agvbench.diagnosis.residuals.periodic import periodic_disturbance
 from agvbench.diagnosis.selection.with_term import gain_p_value
@@ -298,3 +298,16 @@ def test_maps_of_a_front_axle_do_not_absorb_what_the_rear_axle_does():
         gain, (size,) = regression.gain(of_rear)
         assert (gain > 10.0) is is_seen
         assert size == pytest.approx(0.02 if is_seen else 0.0, abs=0.003)
+
+
+def test_steps_of_one_group_show_no_dependence():
+    """A vehicle that only turns on the spot beside one straight run has steps of some length in that group alone."""
+    assert dependences(drives(0), np.zeros(RUNS, dtype=np.int64), 0) == []
+
+
+@pytest.mark.parametrize("logged_runs", [0, REPEATS])
+def test_a_column_that_few_runs_or_none_have_is_no_covariate(logged_runs):
+    rates = drives(0)
+    value = np.where(rates.run < logged_runs, rates.run + 20.0, np.nan)
+    columns = {"temperature_C": LoggedSteps(value, is_text=False)}
+    assert dependences(dataclasses.replace(rates, logged=columns), GROUP, 0) == []

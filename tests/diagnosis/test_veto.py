@@ -11,13 +11,14 @@ from tiny_vehicle import FRONT_M, HEADER, NEUTRAL_COMMAND, REAR_M, InMemory, Tin
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.data.splits import split_runs, with_other_validation
+from agvbench.diagnosis.estimation.levenberg_marquardt import LevenbergMarquardt
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps
 from agvbench.diagnosis.model.steady_drives import start_values, steady_drives
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.diagnosis.selection.refused_effects import with_refused_effects
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.validation import _is_better, predicts_left_out, validated
+from agvbench.diagnosis.selection.validation import _is_better, predicts, predicts_left_out, validated
 from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
 from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
 from agvbench.diagnosis.terms.speed import SpeedInDisc
@@ -122,6 +123,29 @@ def test_the_maps_alone_are_not_fitted_again_to_be_compared_with_themselves(trie
     base = selector.base()
     monkeypatch.setattr(Selector, "for_batch", None)
     assert predicts_left_out(base, base, selector)
+
+
+def test_a_single_group_cannot_be_left_out(tried):
+    selector, _, _ = tried
+    base, readings = selector.base(), selector.batch.readings
+    lag = selector.with_effect(base, "steering_lag")
+    one = readings.select(readings.group == readings.group[0])
+    alone = selector.for_batch(Batch(one, selector.batch.maps, selector.batch.geometry))
+    assert predicts_left_out(lag, base, alone)
+
+
+def test_a_model_that_cannot_be_evaluated_predicts_nothing(found, spoilt, monkeypatch):
+    selection, kept = found
+
+    def diverges(solver, state, near=None):
+        if state.parameters is spoilt.chosen.fit.parameters:
+            raise np.linalg.LinAlgError
+        return evaluate(solver, state, near)
+
+    evaluate = LevenbergMarquardt.evaluate
+    monkeypatch.setattr(LevenbergMarquardt, "evaluate", diverges)
+    assert not predicts(spoilt.chosen, selection.base, kept)
+    assert predicts(selection.chosen, spoilt.chosen, kept)
 
 
 def test_a_cause_that_helps_stays(found):

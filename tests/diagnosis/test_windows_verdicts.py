@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from free_drives import FREE_HEADER, calm, free_runs
 from tiny_vehicle import NEUTRAL_COMMAND, Tiny
@@ -13,7 +14,7 @@ from tiny_vehicle import NEUTRAL_COMMAND, Tiny
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_windows
 from agvbench.diagnosis.data.windows import Horizon
-from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
+from agvbench.diagnosis.findings.corrected_vehicle import _table, corrected_vehicle
 from agvbench.diagnosis.free_driving.method import static_maps
 from agvbench.diagnosis.model.predictor import MAX_ANGLE_RAD
 from agvbench.effects.variants import effect_variants
@@ -143,3 +144,12 @@ def test_an_angle_that_no_axle_has_is_the_limit_in_the_corrected_vehicle():
     wild[maps.slices()["front"]] *= 100.0
     vehicle = corrected_vehicle(FREE_HEADER, FREE_HEADER.geometry, replace(fitted, parameters=wild), maps, 0)
     assert max(map(abs, vehicle.front.output_range)) == pytest.approx(MAX_ANGLE_RAD)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_axle_that_does_not_respond_has_a_fixed_angle_or_an_ascending_or_descending_one(seed):
+    """Its angles are noise, and known very differently from level to level."""
+    rng = np.random.default_rng(seed)
+    commands, angles = np.linspace(1000.0, 2000.0, 7), rng.normal(0.0, 1e-3, 7)
+    made = _table(commands, angles, 10.0 ** rng.uniform(0.0, 6.0, 7))
+    assert np.abs(made(commands)).max() <= np.abs(angles).max() + 1e-6

@@ -112,6 +112,7 @@ class Tiny:
     speed_factor: float = 1.0
     steering_factor: float = 1.0
     front_trim_rad: float = 0.0
+    is_preset: bool = False
     axle_scatter_rad: float = 0.001
     speed_scatter: float = 0.002
     noise_m: float = 3e-4
@@ -173,7 +174,8 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
     steering_lag_s = tiny.steering_lag_s + tiny.cold_steering_lag_s * math.exp(-hours / tiny.warm_h)
     warm = 1.0 + tiny.warm_gain * -math.expm1(-hours / tiny.warm_h)
     x, y, heading = start
-    front, rear, speed = front_of(NEUTRAL) + f_off, rear_of(NEUTRAL) + r_off, 0.0
+    unmoved = commands.at(0) if tiny.is_preset else NEUTRAL_COMMAND
+    front, rear, speed = front_of(unmoved.front) + f_off, rear_of(unmoved.rear) + r_off, 0.0
     turning, loose, driven, windup, gap_m = [0.0, 0.0], [front, rear], 0.0, 0.0, 0.0
     strained, crept = [(front, 0.0), (rear, 0.0)], [front, rear]
     load, before_asked = 0.0, (front_of(NEUTRAL), rear_of(NEUTRAL))
@@ -186,7 +188,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
             times.append(t)
             poses.append((x, y, heading))
         row = int(np.searchsorted(commands.t_s, t - tiny.delay_s + 1e-12, side="right")) - 1
-        c = commands.at(row) if row >= 0 else Command(NEUTRAL, NEUTRAL, NEUTRAL)
+        c = commands.at(row) if row >= 0 else unmoved
         commanded = speed_of(c.drive) * gain
         asked, commanded = electronics.obey(c, commanded)
         load = load * math.exp(-_STEP_S / tiny.sag_s) + sum(map(abs, np.subtract(asked, before_asked)))

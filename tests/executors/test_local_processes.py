@@ -67,6 +67,16 @@ def test_tasks_without_end_are_begun_as_others_end(tmp_path):
         assert len({int(path.name.split("-")[0]) for path in tmp_path.iterdir()} - set(ended)) <= 2
 
 
+def test_the_processes_share_the_processors_unless_the_environment_says_how_many_threads_there_are(monkeypatch):
+    pytest.importorskip("numba")
+    monkeypatch.delenv("NUMBA_NUM_THREADS", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 8)
+    assert run(executed.threads, [(1,)], jobs=2)[0].result == 4
+    assert run(executed.threads, [(1,)], jobs=16)[0].result == 1
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "3")
+    assert run(executed.threads, [(1,)], jobs=2)[0].result == 3
+
+
 def test_the_processes_stay_and_end_with_the_executor():
     with open_executor(ExecutorOptions(jobs=2)) as executor:
         ids = {o.result for o in executor.run((Task(n, executed.process_id, (n,)) for n in range(8)), int)}

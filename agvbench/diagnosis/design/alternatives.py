@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -43,37 +44,42 @@ def alternative_models(
     pairs = []
     for name, others in alternatives.items():
         group = [Alternative(name, name, chosen)]
-        group += [Alternative(other, name, swapped(chosen, name, other, candidates)) for other in others]
+        fits = {other: swapped(chosen, name, other, candidates) for other in others}
+        group += [Alternative(other, name, own) for other, own in fits.items() if own is not None]
         # Pairs with the named effect come first; the others are left to a later experiment.
         pairs += list(combinations(group, 2))[: max(_MAX_PAIRS, len(others))]
     return pairs
 
 
-def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candidate]) -> Fit:
-    """Return the model with the effect `other` in the place of `name`, fitted from the best of its starts."""
+def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candidate]) -> Fit | None:
+    """Return the model with the effect `other` in the place of `name`, fitted from the best of its starts.
+
+    None if the fits diverge from all of them.
+    """
     names = (*(n for n in chosen.predictor.effects if n != name), other)
     predictor = Predictor(chosen.predictor.batch, names)
     bounds = bounds_of(names)
     kept = [value for key, value in chosen.effect_values().items() if key.partition(".")[0] != name]
     maps = chosen.parameters[: chosen.predictor.maps.size]
 
-    def fitted(start: Floats) -> Fit:
-        initial = np.r_[maps, kept, start]
+    def fitted(parameters: Floats, near: Fit, iterations: int) -> Fit:
         return fit(
             predictor,
-            initial,
+            parameters,
             bounds,
-            random_effects=chosen.random_effects,
-            variance_components=chosen.variance_components,
-            iterations=_FEW_ITERATIONS,
+            random_effects=near.random_effects,
+            variance_components=near.variance_components,
+            iterations=iterations,
         )
 
-    best = min((fitted(start) for start in candidates[other].starts), key=lambda f: f.total_loss)
-    return fit(
-        predictor,
-        best.parameters,
-        bounds,
-        random_effects=best.random_effects,
-        variance_components=best.variance_components,
-        iterations=_MANY_ITERATIONS,
-    )
+    found = []
+    for start in candidates[other].starts:
+        with suppress(np.linalg.LinAlgError):
+            found.append(fitted(np.r_[maps, kept, start], chosen, _FEW_ITERATIONS))
+    if not found:
+        return None
+    best = min(found, key=lambda f: f.total_loss)
+    try:
+        return fitted(best.parameters, best, _MANY_ITERATIONS)
+    except np.linalg.LinAlgError:
+        return best

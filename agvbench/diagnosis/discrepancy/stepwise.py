@@ -172,7 +172,7 @@ def _with_other_change(extended: Selector, selection: Selection, model: ModelWit
         shapes = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1]).reshape(-1, 2, len(kind.bounds))
         for sizes in shapes if issubclass(start.term, ByCampaignTime) else ():
             other = extended.with_effect(without, start.term.name, replace(kind, starts=sizes))
-            if other.deviance < best.deviance and not _is_constant_change(other, start.term):
+            if other.is_fitted and other.deviance < best.deviance and not _is_constant_change(other, start.term):
                 best, term = other, start.term
     if best.gain_over(chosen) < SELECTION.alternative_margin:
         return model

@@ -14,6 +14,11 @@ def bounded_step(matrix: Floats, gradient: Floats, parameters: Floats, bounds: F
     clipped, the others would compensate for a move that is not made, and no fraction of the step might reduce the
     objective. Which parameters are held follows from the step and its multipliers (primal-dual active set strategy:
     Hintermüller, Ito and Kunisch, SIAM Journal on Optimization 13, 2003).
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If no step is finite.
     """
     first = len(parameters) - len(bounds)
     low, high = bounds.T - parameters[first:]
@@ -29,4 +34,6 @@ def bounded_step(matrix: Floats, gradient: Floats, parameters: Floats, bounds: F
             break
         held[first:] = below | above
         own[below], own[above] = low[below], high[above]
+    if not np.isfinite(move).all():
+        raise np.linalg.LinAlgError("no step is finite")
     return move

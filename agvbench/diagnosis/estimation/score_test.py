@@ -83,9 +83,16 @@ def one_step_estimate(
     The estimate is one Newton step from `start` (q,), with all other parameters refitted; parameters that are not
     `free` (q,) keep their start, and have a standard error of zero. A standard error is the larger of those of the
     likelihood and of the sandwich estimator with groups of runs (R,) as clusters (Liang and Zeger 1986).
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If a derivative is not finite.
     """
     parameters = initial_parameters(fitted, larger, start)
     poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start))
+    if not np.isfinite(slopes[larger.readings.seen]).all():
+        raise np.linalg.LinAlgError("the model cannot be evaluated")
     terms = _terms(fitted, larger, residual_of(larger, poses), slopes)
     known, prior = len(fitted.parameters), larger.prior(parameters)
     gradient = terms.gradient.sum(axis=0) + prior.gradient

@@ -60,6 +60,8 @@ def _table(commands: Floats, values: Floats, weight: Floats) -> StaticMap:
         return Fixed(output=round(float(values[0]), _DIGITS), command=float(commands[0]))
     from scipy.optimize import isotonic_regression
 
-    rising = bool(np.polyfit(commands, values, 1)[0] > 0.0)
-    smooth = np.asarray(isotonic_regression(values, weights=weight, increasing=rising).x)
-    return MonotoneTable(tuple(commands.tolist()), tuple(smooth.round(_DIGITS).tolist()), "linear")
+    both = [isotonic_regression(values, weights=weight, increasing=rising).x for rising in (True, False)]
+    smooth = min(both, key=lambda one: float(weight @ (one - values) ** 2)).round(_DIGITS)
+    if np.ptp(smooth) == 0.0:  # an axle that does not respond
+        return Fixed(output=float(smooth[0]), command=float(commands[0]))
+    return MonotoneTable(tuple(commands.tolist()), tuple(smooth.tolist()), "linear")

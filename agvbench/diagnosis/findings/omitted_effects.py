@@ -58,7 +58,10 @@ def omitted_effects(chosen: Fit) -> dict[str, OmittedEffect]:
         larger = Predictor(predictor.batch, (*predictor.effects, name))
         free = np.array([not p.is_direction for p in parameters])
         group = predictor.readings.group
-        estimates = tuple(one_step_estimate(chosen, larger, start, free, group) for start in _small_starts(kind))
+        try:
+            estimates = tuple(one_step_estimate(chosen, larger, start, free, group) for start in _small_starts(kind))
+        except np.linalg.LinAlgError:
+            continue  # nothing is known of what cannot be evaluated
         nulls = np.where(free, [p.null for p in parameters], estimates[0].estimate)
         found[name] = OmittedEffect(nulls, np.array([p.scale for p in parameters]), estimates)
     return found

@@ -146,6 +146,8 @@ def _basis(covariate: Floats, name: str) -> Floats:
     """Return a basis (n, q) without constant: sines for an angle, otherwise hat functions at quantiles."""
     if name in ("heading_rad", "course_rad"):
         return np.column_stack([np.cos(covariate), np.sin(covariate), np.cos(2 * covariate), np.sin(2 * covariate)])
+    if not len(covariate):
+        return np.empty((0, 0))
     knots = np.unique(np.quantile(covariate, np.linspace(0.0, 1.0, _KNOTS)))
     # Curves between nearly coincident knots would fit noise.
     if len(knots) > 1:
@@ -194,7 +196,9 @@ def _negative_log_p(square: Floats, dof: int) -> Floats:
 
 
 def _share(basis: Floats, value: Floats, weight: Floats, fold: NDArray[np.int64]) -> float:
-    """Return the share of the weighted variance that the curve predicts in the folds left out."""
+    """Return the share of the weighted variance that the curve predicts in the folds left out; 0 with a single fold."""
+    if len(np.unique(fold)) < 2:
+        return 0.0
     full = np.column_stack([np.ones(len(value)), basis])
     error = total = 0.0
     for k in np.unique(fold):

@@ -230,7 +230,7 @@ def prefer_actuators(selection: Selection, selector: Selector) -> Selection:
     extended = with_extended_library(selector)
     without = extended.without_effect(selection.base, chosen, camera)
     every = _with_actuators(extended, without)
-    if selector.batch.geometry.is_differential:
+    if selector.batch.geometry.is_differential and not {*MOTORS} & {cause_of(name) for name in selector.given}:
         # The camera resembles the lags of both motors together, and none of them alone.
         slow = [name for name in chosen.names if cause_of(name) in (CAMERA, *MOTORS) and name not in selector.given]
         joint = _with_lag_and_delay(extended, chosen, slow)

@@ -136,7 +136,9 @@ def given_effects(vehicle: VehicleModel | None, tried: Iterable[str]) -> tuple[t
     # A null effect with a prior is a quantity that was measured, and may deviate by its error.
     measured = {prior.effect for prior in priors if not is_limit(prior)}
     given = [e for e in effects if e.name in known and not (e.is_null and cause_of(e.name) not in measured)]
-    return tuple(e.name for e in given), np.array([value for e in given for value in e.values.values()])
+    names, values = tuple(e.name for e in given), np.array([value for e in given for value in e.values.values()])
+    # A limit that is left out is infinite: no step of a fit begins there.
+    return names, np.clip(values, *bounds_of(names).T)
 
 
 @cache

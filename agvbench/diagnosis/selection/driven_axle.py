@@ -6,6 +6,7 @@ turns is wrong by a cosine of the steering angle, which no map absorbs, and whic
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import get_args
 
@@ -41,10 +42,10 @@ def better_driven_axle(selection: Selection, selector: Selector) -> Driven | Non
         return None
     if not (any(map(_is_of_turns, chosen.names)) or may_have_structure(chosen, selector.seed)):
         return None
-    models = {axle: _with_driven_axle(chosen, selector, axle) for axle in _AXLES if axle != UNDECLARED}
-    best, other = sorted(models, key=lambda axle: models[axle].deviance)
-    is_better = models[best].deviance < chosen.deviance - SELECTION.min_gain
-    return best if is_better and models[other].deviance > chosen.deviance + SELECTION.min_gain else None
+    deviances = {axle: _with_driven_axle(chosen, selector, axle) for axle in _AXLES if axle != UNDECLARED}
+    best, other = sorted(deviances, key=lambda axle: deviances[axle])
+    is_better = deviances[best] < chosen.deviance - SELECTION.min_gain
+    return best if is_better and deviances[other] > chosen.deviance + SELECTION.min_gain else None
 
 
 def _is_of_turns(name: str) -> bool:
@@ -53,11 +54,17 @@ def _is_of_turns(name: str) -> bool:
     return cause_of(name) == "cornering_speed_loss" or (kind is not None and kind.needs_both_axles_driven)
 
 
-def _with_driven_axle(chosen: ScoredModel, selector: Selector, axle: Driven) -> ScoredModel:
-    """Return the chosen model with one driven axle, less the effects on the speed in turns."""
+def _with_driven_axle(chosen: ScoredModel, selector: Selector, axle: Driven) -> float:
+    """Return the deviance of the chosen model with one driven axle, less the effects on the speed in turns.
+
+    It is infinite where the fit diverges.
+    """
     batch, own = chosen.fit.predictor.batch, chosen.fit.effect_values()
     names = tuple(name for name in chosen.names if not _is_of_turns(name))
     kept = [value for key, value in own.items() if key.partition(".")[0] in names]
     start = np.r_[chosen.fit.parameters[: batch.maps.size], kept]
     other = Batch(batch.readings, batch.maps, replace(batch.geometry, driven=axle), kinds=batch.kinds)
-    return selector.for_batch(other).score(names, start, None)
+    try:
+        return selector.for_batch(other).score(names, start, None).deviance
+    except np.linalg.LinAlgError:
+        return math.inf

@@ -65,6 +65,8 @@ def _lengths_but_for_markers(extended: Selector, selection: Selection, name: str
         return {}
     chosen = selection.chosen
     model = extended.with_effect(extended.without_effect(selection.base, chosen, name), others[0])
+    if not model.is_fitted:
+        return {}
     model = extended.with_effect(model, _MARKERS)
     moved = [value for key, value in model.fit.effect_values().items() if key.startswith(f"{_MARKERS}.")]
     if not model.is_fitted or math.hypot(*moved) > _TOLERANCE_M:

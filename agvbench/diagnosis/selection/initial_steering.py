@@ -28,6 +28,8 @@ def choose_initial_steering(selector: AnySelector) -> AnySelector:
 
     The comparison is between the best models with a single effect that delays the axles.
     """
+    if not has_initial_steering(selector):
+        return selector
     base, other = selector.base(), under_other_initial_steering(selector)
     if set(STEERING_DYNAMICS) & {cause_of(name) for name in selector.given}:
         return other if other.base().deviance < base.deviance - SELECTION.min_gain else selector
@@ -40,6 +42,8 @@ def reconsider_initial_steering(selection: Selection, selector: AnySelector) -> 
     If the model has no effect that delays the axles, the best one of them is added under both hypotheses. Beside a
     cause that was missing when the hypothesis was chosen, the other one may be right.
     """
+    if not has_initial_steering(selector):
+        return selection, selector
     chosen = selection.chosen
     has_delay = bool(set(STEERING_DYNAMICS) & {cause_of(name) for name in chosen.names})
     if not has_delay and chosen.names == selector.given:
@@ -66,6 +70,12 @@ def _is_better_beside(other: Selector, there: ScoredModel, selector: Selector, h
         for one, model in ((selector, here), (other, there))
     )
     return other_best < min(best, here.deviance) - SELECTION.min_gain
+
+
+def has_initial_steering(selector: Selector) -> bool:
+    """Return whether the steering can have been set before a run: a differential vehicle at rest has no yaw rate."""
+    readings = selector.batch.readings
+    return not selector.batch.geometry.is_differential or readings.initial_states is not None
 
 
 def under_other_initial_steering(selector: AnySelector) -> AnySelector:

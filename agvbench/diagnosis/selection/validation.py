@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -148,8 +149,11 @@ def predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
     if chosen.names == base.names or not len(kept):
         return True
     fitted = chosen.fit.predictor.batch
-    batch = Batch(kept, fitted.maps, fitted.geometry, kinds=fitted.kinds)
+    under = replace(kept, preset=fitted.readings.preset)
+    batch = Batch(under, fitted.maps, fitted.geometry, kinds=fitted.kinds)
     (own, square), (without, square_without) = _in_batch(chosen, batch), _in_batch(base, batch)
+    if math.isinf(own) or math.isinf(without):
+        return own <= without
     worse, chance = _difference(square, square_without)
     return worse <= 0.0 or (own <= without and worse <= chance)
 
@@ -164,16 +168,20 @@ def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector
         return True
     batch, count = selector.batch, RESIDUAL.left_out_folds
     fold = folds(batch.readings.group, count, selector.seed)
+    if np.ptp(fold) == 0:
+        return True  # one group: nothing can be left out
     deviance, square = np.zeros(2), np.empty((2, len(fold)))
-    for k in range(count):
+    for k in np.unique(fold):
         others, own = (
             Batch(batch.readings.select(runs), batch.maps, batch.geometry, kinds=batch.kinds)
             for runs in (fold != k, fold == k)
         )
         refitted = selector.for_batch(others)
         for i, model in enumerate((chosen, base)):
-            loss, square[i, fold == k] = _in_batch(refitted.score(model.names, model.fit.parameters, None), own)
+            loss, square[i, fold == k] = _left_out(refitted, model, own)
             deviance[i] += loss
+    if np.isinf(deviance).any():
+        return bool(deviance[0] <= deviance[1])
     _, index = np.unique(batch.readings.group, return_inverse=True)
     errors = group_means(square.T, index).T
     return _is_better((deviance[0], errors[0]), (deviance[1], errors[1]))
@@ -201,10 +209,24 @@ def _difference(own: Floats, base: Floats) -> tuple[float, float]:
     return float(np.mean(worse)), float(chance)
 
 
+def _left_out(refitted: Selector, model: ScoredModel, own: Batch) -> tuple[float, Floats]:
+    """Return what `_in_batch` returns in the runs `own` of a model that is fitted to the others."""
+    try:
+        return _in_batch(refitted.score(model.names, model.fit.parameters, None), own)
+    except np.linalg.LinAlgError:
+        return math.inf, np.full(len(own.readings), math.inf)  # the fit diverged
+
+
 def _in_batch(model: ScoredModel, batch: Batch) -> tuple[float, Floats]:
-    """Return a model's deviance in the runs of `batch`, and its mean squared position error in each (R,) [m²]."""
+    """Return a model's deviance in the runs of `batch`, and its mean squared position error in each (R,) [m²].
+
+    Both are infinite where the model cannot be evaluated.
+    """
     predictor, own = Predictor(batch, model.fit.predictor.effects), model.fit
     still = np.zeros((len(batch.readings), own.random_effects.shape[1]))
     state = FitState(own.parameters, still, own.variance_components)
-    loss = LevenbergMarquardt(predictor, np.empty((0, 2))).evaluate(state).terms.loss.sum()
+    try:
+        loss = LevenbergMarquardt(predictor, np.empty((0, 2))).evaluate(state).terms.loss.sum()
+    except np.linalg.LinAlgError:
+        return math.inf, np.full(len(batch.readings), math.inf)
     return float(loss), pose_residuals(batch.readings, predictor.predict(own.parameters)).squares()["position_rms_mm"]

@@ -15,7 +15,7 @@ from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, applies, bounds_of, candidate, candidates
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
-from agvbench.diagnosis.selection.initial_steering import under_other_initial_steering
+from agvbench.diagnosis.selection.initial_steering import has_initial_steering, under_other_initial_steering
 from agvbench.diagnosis.selection.stepwise import AnySelector, Selection, Selector
 from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import Effect
@@ -162,12 +162,18 @@ def prefers_other_initial_steering(chosen: ScoredModel, selector: Selector) -> b
 
     Slow steering depends on it, and so does every term of what the steering did before.
     """
+    if not has_initial_steering(selector):
+        return False
     there = under_other_initial_steering(with_extended_library(selector))
     fitted = chosen.fit
     poses = Predictor(there.batch, chosen.names).predict(fitted.parameters)
     if np.allclose(poses, fitted.predictor.predict(fitted.parameters), rtol=0.0, atol=_SAME_POSE, equal_nan=True):
         return False
-    return there.score(chosen.names, chosen.fit.parameters, None).deviance < chosen.deviance - SELECTION.min_gain
+    try:
+        other = there.score(chosen.names, chosen.fit.parameters, None)
+    except np.linalg.LinAlgError:
+        return False  # the fit diverged
+    return other.deviance < chosen.deviance - SELECTION.min_gain
 
 
 def select_under_other_initial_steering(selector: Selector) -> tuple[Selection, Selector]:

@@ -71,7 +71,7 @@ class ProcessExecutor(Executor):
     def _give(self, task: Task[Key], busy: Iterable[_Worker]) -> _Worker:
         """Hand a task to an idle process, or to a new one."""
         idle = [worker for worker in self._workers if worker not in busy and worker.is_alive]
-        worker = idle[0] if idle else _Worker()
+        worker = idle[0] if idle else _Worker(max(1, (os.cpu_count() or 1) // self._jobs))
         if not idle:
             self._workers.append(worker)
         worker.give(task)
@@ -79,12 +79,17 @@ class ProcessExecutor(Executor):
 
 
 class _Worker:
-    """A process that runs one task at a time."""
+    """A process that runs one task at a time.
 
-    def __init__(self) -> None:
+    It simulates in as many `threads`, unless the environment says in how many.
+    """
+
+    def __init__(self, threads: int) -> None:
         self.connection, theirs = Pipe()
         number = theirs.fileno()
-        self._process = subprocess.Popen([sys.executable, "-c", _PROGRAM, str(number)], pass_fds=(number,))  # noqa: S603
+        command = [sys.executable, "-c", _PROGRAM, str(number)]
+        environment = {"NUMBA_NUM_THREADS": str(threads)} | os.environ
+        self._process = subprocess.Popen(command, pass_fds=(number,), env=environment)  # noqa: S603 - our own program
         theirs.close()
         self._send(sys.path)
 

@@ -25,6 +25,7 @@ from agvbench.effects.state import LOGGED_COUNT
 from agvbench.errors import InputError, VehicleError
 from agvbench.model.simulation.compose import kernel
 from agvbench.model.simulation.hook_errors import check_hooks
+from agvbench.model.simulation.threads import in_threads
 from agvbench.types import Command, Commands, Floats
 from agvbench.vehicle.geometry import Geometry
 
@@ -237,18 +238,16 @@ class Simulation:
             if np.isnan(values).any():
                 raise InputError("is not a number", where=what, value="NaN")
         poses = np.full((len(self.t_s), 3), np.nan) if out is None else out
+        vehicle = [
+            self.geometry.front_axle_m,
+            self.geometry.rear_axle_m,
+            self.geometry.front_drive_share,
+            self._longest_step(parameters),
+            0.0,
+            nodal_deviation,
+            float(self.geometry.is_differential),
+        ]
         arguments = (
-            np.array(
-                [
-                    self.geometry.front_axle_m,
-                    self.geometry.rear_axle_m,
-                    self.geometry.front_drive_share,
-                    self._longest_step(parameters),
-                    0.0,
-                    nodal_deviation,
-                    float(self.geometry.is_differential),
-                ]
-            ),
             np.append(parameters, np.logical_or.reduceat(parameters != self.nulls, self._first_parameters)),
             np.ascontiguousarray(initial, dtype=np.float64),
             self._begins_s,
@@ -260,13 +259,16 @@ class Simulation:
             self.row_starts,
             self.t_s,
             self.frame_starts,
-            self._all_runs if runs is None else np.asarray(runs, dtype=np.int64),
-            poses,
         )
-        self._simulate(arguments)
+
+        def simulate(chosen: Integers) -> None:
+            # The kernel keeps a working value in the array of the vehicle: each thread has its own.
+            self._simulate(np.array(vehicle), *arguments, chosen, poses)
+
+        in_threads(simulate, self._all_runs if runs is None else np.asarray(runs, dtype=np.int64))
         return poses
 
-    def _simulate(self, arguments: tuple[Floats | Integers, ...]) -> None:
+    def _simulate(self, *arguments: Floats | Integers) -> None:
         """Call the kernel; an error of compilation names the hook that it comes from."""
         try:
             self._kernel(*arguments)
