@@ -35,7 +35,6 @@ from agvbench.diagnosis.selection.validation import Assessment, assess, predicto
 from agvbench.diagnosis.selection.variants import candidates_for
 from agvbench.diagnosis.selection.with_term import TermSelection, with_terms_first
 from agvbench.diagnosis.terms import TERMS
-from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
 from agvbench.types import Floats
 
@@ -90,7 +89,7 @@ class Conclusion:
             )
         rest, likely = self._dependences(every.batch, poses)
         found = with_residuals(self._found(tested, rest, likely), readings, self.split.test, before, poses)
-        if self.term_selection or effect_variants().keys() & set(chosen.names):
+        if self.term_selection:
             return found
         return with_next_experiment(found, self.selection, readings, self.context.header, self.context.seed)
 

@@ -311,3 +311,11 @@ def test_a_column_that_few_runs_or_none_have_is_no_covariate(logged_runs):
     value = np.where(rates.run < logged_runs, rates.run + 20.0, np.nan)
     columns = {"temperature_C": LoggedSteps(value, is_text=False)}
     assert dependences(dataclasses.replace(rates, logged=columns), GROUP, 0) == []
+
+
+def test_runs_without_a_step_that_is_long_enough_have_no_dependence_and_no_term():
+    rates, names = drives(0), ("run", "value", "weight", "begin", "end", "step")
+    covariates = {name: values[:0] for name, values in rates.covariates.items()}
+    empty = Rates(**{name: getattr(rates, name)[:0] for name in names}, covariates=covariates)
+    assert dependences(empty, GROUP, 0) == []
+    assert screened(empty) == []

@@ -198,6 +198,8 @@ def _read(run: Run, neutral: Command | None, *, turns_on_the_spot: bool) -> tupl
     frames = _in_order(run)
     if len(frames) < _MIN_FRAMES or not len(run.commands):
         raise FitError("too few frames", value=len(frames), limit=f"at least {_MIN_FRAMES}")
+    if frames.t_s[-1] <= 0.0:
+        raise FitError("was not seen after its first command")
     start, stderr = initial_pose(run, frames, neutral, turns_on_the_spot=turns_on_the_spot)
     t_s, poses = _sampled(frames, np.linspace(0.0, float(frames.t_s[-1]), SAMPLES + 1)[1:])
     if np.count_nonzero(np.isfinite(poses[:, 0])) < _MIN_SAMPLES:

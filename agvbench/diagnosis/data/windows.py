@@ -241,9 +241,8 @@ def cut_windows(
 
 
 def _first_prediction_s(run: Run) -> float:
-    """Return the time of the first command, or zero if the run was recorded from before its first command."""
-    recorded_before = len(run.frames) and run.frames.t_s[0] < 0.0
-    return 0.0 if recorded_before else max(0.0, float(run.commands.t_s[0]))
+    """Return the time of the first command; not before zero."""
+    return max(0.0, float(run.commands.t_s[0]))
 
 
 def _require_frames(run: Run, t_s: Floats, horizon: Horizon) -> None:

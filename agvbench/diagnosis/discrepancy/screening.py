@@ -46,7 +46,12 @@ class Start:
 def screen(
     rates: Rates, history: CommandHistory, geometry: Geometry, group: NDArray[np.int64], seed: int
 ) -> list[Start]:
-    """Return the best start of each term with a predicted gain, the largest gain first."""
+    """Return the best start of each term with a predicted gain, the largest gain first.
+
+    There is none where no step of a run is long enough for a rate.
+    """
+    if not len(rates.run):
+        return []
     rear_axle_m = None if geometry.is_differential else geometry.rear_axle_m
     regression = GroupedRegression(rates, history, folds(group, FOLDS, seed)[rates.run], rear_axle_m)
     found: dict[type[DiscrepancyTerm], Start] = {}

@@ -55,6 +55,8 @@ def stability_test(
     seed
         Seed of the permutations.
     """
+    if not len(rates.run):
+        return []
     names, scores = _scores(rates, directions, len(readings))
     labels, courses = _courses(readings)
     index = np.unique(readings.group, return_inverse=True)[1]

@@ -180,7 +180,10 @@ class LevenbergMarquardt:
                     raise
                 return Iterated(known, Convergence.CONVERGED, None)
             known, reduction = state, before - evaluation.loss
-            state, taken = self._step(state, evaluation)
+            try:
+                state, taken = self._step(state, evaluation)
+            except np.linalg.LinAlgError:
+                return Iterated(known, Convergence.CONVERGED, None)
             before = evaluation.loss
             if near is not None:
                 if reduction < FIT.nearly_converged or step >= iterations // 2:
@@ -263,16 +266,16 @@ class LevenbergMarquardt:
         The variance components grow with the residual, which widens the valley.
         """
         start, near = evaluation.loss, evaluation.linear.by_first(self.predictor.maps.size)
-        point = self._step_solver(state, evaluation).full(self._point(state, evaluation), evaluation.terms)
-        now = self._updated(point, state, evaluation.terms.inner_inverse, evaluation.linear)
-        for _ in range(FIT.non_monotone_steps):
-            try:
+        try:
+            point = self._step_solver(state, evaluation).full(self._point(state, evaluation), evaluation.terms)
+            now = self._updated(point, state, evaluation.terms.inner_inverse, evaluation.linear)
+            for _ in range(FIT.non_monotone_steps):
                 evaluation = self.evaluate(now, near)
-            except np.linalg.LinAlgError:
-                return None
-            if evaluation.loss < start - FIT.min_reduction:
-                return now
-            now, _ = self._step(now, evaluation)
+                if evaluation.loss < start - FIT.min_reduction:
+                    return now
+                now, _ = self._step(now, evaluation)
+        except np.linalg.LinAlgError:
+            return None
         return now if evaluation.loss < start - FIT.nearly_converged else None
 
     def _step(self, state: FitState, evaluation: Evaluation) -> tuple[FitState, Step]:

@@ -57,6 +57,13 @@ def first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floa
     existing parameters are those of `fitted`, so that a few simulations replace a fit. What cannot be evaluated at
     `start` gains −∞.
     """
+    try:
+        return _first_order_gain(fitted, larger, start, bounds)
+    except np.linalg.LinAlgError:
+        return -math.inf
+
+
+def _first_order_gain(fitted: Fit, larger: Predictor, start: Floats, bounds: Floats) -> float:
     parameters = initial_parameters(fitted, larger, start)
     poses, slopes = larger.by_last(parameters, fitted.random_effects, len(start), fitted.linear.poses)
     seen = larger.readings.seen

@@ -72,6 +72,8 @@ def drive_levels(readings: Readings, predictor: Predictor, parameters: Floats) -
     static, maps = Predictor(batch), parameters[: predictor.maps.size]
     by_speed = _levels(readings, _speed_deviations(static, maps))
     by_distance = _levels(readings, _distance_deviations(static, maps))
+    if not by_speed:
+        return by_distance
     is_better = by_speed.keys() <= by_distance.keys() and _mean_square(by_distance) < _mean_square(by_speed)
     return by_distance if is_better else by_speed
 
@@ -193,7 +195,7 @@ def _distance_deviations(predictor: Predictor, parameters: Floats) -> Floats:
 def _is_held(commands: Commands, begin_s: float, end_s: float) -> bool:
     """Return whether the drive has one command from `begin_s` to `end_s`."""
     first, last = np.searchsorted(commands.t_s, [begin_s, end_s], side="right") - 1
-    return bool(np.ptp(commands.drive[max(int(first), 0) : int(last) + 1]) == 0.0)
+    return bool(np.ptp(commands.drive[max(int(first), 0) : max(int(last), 0) + 1]) == 0.0)
 
 
 def _speed_deviations(predictor: Predictor, parameters: Floats) -> Floats:

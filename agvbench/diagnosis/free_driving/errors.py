@@ -68,8 +68,9 @@ def repeatability_squares(readings: Readings, perturbed: Floats, sample: int = -
 
 
 def rms(values: Floats, name: str) -> float:
-    """Return the root mean square of squared errors in the unit of the quantity's name."""
-    return QUANTITIES[name] * float(np.sqrt(np.nanmean(values)))
+    """Return the root mean square of squared errors in the unit of the quantity's name; NaN if none was measured."""
+    measured = values[np.isfinite(values)]
+    return QUANTITIES[name] * float(np.sqrt(np.mean(measured))) if len(measured) else np.nan
 
 
 @dataclass(frozen=True)

@@ -72,10 +72,14 @@ def _on_each_side(commanded: Floats, count: int, neutral: float) -> Floats:
 
 
 def _side(commanded: Floats, count: int, neutral: float) -> Floats:
-    """Return evenly spaced nodes from the 2 % quantile of the distance from neutral to the largest."""
+    """Return evenly spaced nodes from the 2 % quantile of the distance from neutral to the largest.
+
+    They begin at the smallest distance if nearly all commands are the largest one, and are one if there is no other.
+    """
     distance = np.abs(commanded - neutral)
     low, high = np.quantile(distance, 0.02), distance.max()
-    return np.sort(neutral + np.sign(commanded[0] - neutral) * np.linspace(low, high, count))
+    low = low if low < high else distance.min()
+    return np.unique(neutral + np.sign(commanded[0] - neutral) * np.linspace(low, high, count))
 
 
 def start_values_of_windows(maps: NodalMaps, readings: Readings, geometry: Geometry) -> Floats:

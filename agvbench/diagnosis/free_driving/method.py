@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from agvbench.diagnosis.context import require_runs
 from agvbench.diagnosis.criteria import DATA, SESSION_CLOCK
+from agvbench.diagnosis.data.initial_pose import is_driven
 from agvbench.diagnosis.data.readings import Readings, read_windows
 from agvbench.diagnosis.data.session_clocks import aligned, clock_offsets
 from agvbench.diagnosis.data.splits import Split
@@ -92,6 +93,9 @@ class FreeDriving(Method[SelectedFromWindows]):
             )
         if (stretches := len(np.unique(readings.group))) < DATA.min_blocks:
             return f"{stretches} stretches of {self.horizon.block_s:g} s are too few for a test: drive for longer"
+        is_differential, neutral = self.context.geometry.is_differential, self.context.header.neutral
+        if not any(is_driven(run.commands, neutral, turns_on_the_spot=is_differential).any() for run in readings.runs):
+            return "the drive was never commanded anything but neutral"
         turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
         if np.count_nonzero(turned > DATA.min_turn_rad) < DATA.min_blocks:
             return "steering was never excited: hardly a window turns"

@@ -67,6 +67,8 @@ def dependences(
     alpha
         Level of significance.
     """
+    if not len(rates.run):
+        return []
     fold = folds(group, 5, seed)[rates.run]
     rng = np.random.default_rng([0x5C0E, seed])
     groups = _Units.drawn(group[rates.run], rng)

@@ -140,6 +140,10 @@ def without_effects(selection: Selection) -> Selection:
     return replace(selection, chosen=selection.base, alternatives={}, gains={}, rejected=rejected)
 
 
+_EXACT_M2 = 1e-12
+"""A simulator without noise may be predicted exactly, and an error of zero has no logarithm."""
+
+
 def predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
     """Return whether `chosen` predicts the runs `kept` no worse than `base`.
 
@@ -196,7 +200,7 @@ def _is_better(own: tuple[float, Floats], base: tuple[float, Floats]) -> bool:
     worse, chance = _difference(own[1], base[1])
     if abs(worse) > chance:
         return worse < 0.0
-    typical, chance = _difference(np.log(own[1]), np.log(base[1]))
+    typical, chance = _difference(*(np.log(np.maximum(square, _EXACT_M2)) for square in (own[1], base[1])))
     if abs(typical) > chance and typical * worse >= 0.0:
         return typical < 0.0
     return own[0] <= base[0]
