@@ -17,7 +17,7 @@ from agvbench.notebook_html import heading_html, table_html
 from agvbench.types import Command, Commands, Floats
 from agvbench.vehicle.channels import Channel, Channels, channels_of, quantity_of
 from agvbench.vehicle.geometry import Geometry
-from agvbench.vehicle.maps import StaticMap
+from agvbench.vehicle.maps import Fixed, StaticMap
 
 # The tangent diverges at 90°, and no vehicle has such an angle.
 _LARGEST_ANGLE_RAD = math.radians(89.0)
@@ -103,6 +103,14 @@ class VehicleModel:
         )
 
     def _check_angles(self) -> None:
+        if self.geometry.is_differential and not isinstance(self.rear, Fixed):
+            raise VehicleError(
+                "a differential vehicle steers no rear axle",
+                where="maps.rear",
+                value=type(self.rear).__name__,
+                limit='kind = "fixed"',
+                remedy="correct the map, or geometry.kinematics",
+            )
         for axle in ("rear",) if self.geometry.is_differential else ("front", "rear"):
             ends = [end for end in getattr(self, axle).output_range if math.isfinite(end)]
             for end in ends:

@@ -237,3 +237,8 @@ def test_a_campaign_keeps_its_kinematics(tmp_path) -> None:
 def test_an_older_schema_knows_no_kinematics(change, message) -> None:
     with pytest.raises(CampaignError, match=message):
         replace(HEADER, **change)
+
+
+def test_a_rear_axle_that_is_steered_is_refused():
+    with pytest.raises(VehicleError, match="a differential vehicle steers no rear axle"):
+        replace(turtle(), rear=turtle().front)
