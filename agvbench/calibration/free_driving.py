@@ -108,6 +108,9 @@ def _delay(drives: list[_Drive], role: str, angle: Floats, spread: float) -> flo
     dispersions = []
     for delay in _DELAYS_S:
         level, kept = _levels(_delayed(drives, role, delay), None, spread)
+        if not changing[kept].any():
+            dispersions.append(np.inf)  # no level has windows enough
+            continue
         _, index = np.unique(level[kept], return_inverse=True)
         middle = np.array([np.median(angle[kept][index == k]) for k in range(index.max() + 1)])
         off = np.abs(angle[kept] - middle[index])[changing[kept]]

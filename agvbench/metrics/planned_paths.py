@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
+from typing import get_args
 
 import numpy as np
 
@@ -16,12 +17,15 @@ from agvbench.metrics.measured_run import MeasuredRun
 from agvbench.model import VehicleModel, thesis_vehicle
 from agvbench.planning import Plan, load_trajectory, plan, steered
 from agvbench.planning.trajectories.loading import trajectory_file
+from agvbench.planning.trajectories.segments import Steering
 from agvbench.planning.trajectories.trajectory import TRAJECTORY_NAME
-from agvbench.types import Floats, Run
+from agvbench.text_files import read_toml
+from agvbench.types import Floats, Pose, Run, wrap_angle
 
 _SAME_TARGET = 1e-3
 """In m and rad: plans of two calibrations differ by micrometres where an axle stands a little off."""
 _INPUTS, _INPUT = "inputs", "trajectory "
+_SETTINGS = "bench.toml"
 
 
 class PlannedPaths:
@@ -36,6 +40,7 @@ class PlannedPaths:
     def __init__(self, campaign: Campaign) -> None:
         self._model = _vehicle(campaign)
         self._recorded = _recorded_hashes(campaign)
+        self._steering = _steering(campaign)
         self._plan = lru_cache(maxsize=None)(self._planned)
 
     def of(self, run: Run) -> Floats | None:
@@ -44,7 +49,7 @@ class PlannedPaths:
         None if the trajectory is not known here, has changed, or leads to another target than the run had.
         """
         made = self.plan(planned_name(run))
-        if made is None or not np.allclose(made.target, run.target, rtol=0.0, atol=_SAME_TARGET, equal_nan=True):
+        if made is None or not _is_same(made.target, run.target):
             return None
         return _as_commanded(made, run) if run.condition == "uncalibrated" else made.expected
 
@@ -62,7 +67,7 @@ class PlannedPaths:
         try:
             if self._recorded.get(name) not in (None, sha256(trajectory_file(name))):
                 return None
-            return plan(steered(load_trajectory(name), "", self._model), self._model)
+            return plan(steered(load_trajectory(name), self._steering, self._model), self._model)
         except (AgvbenchError, OSError):
             return None
 
@@ -73,6 +78,23 @@ def _as_commanded(made: Plan, run: Run) -> Floats:
         return made.expected
     t_s = np.interp(made.expected[:, 0], made.commands.t_s, run.commands.t_s)
     return np.column_stack([t_s, made.expected[:, 1:]])
+
+
+def _is_same(target: Pose, other: Pose) -> bool:
+    """Return whether two targets agree, or lack the same; half a turn is the same to either side."""
+    apart = np.array(target) - np.array(other)
+    apart[2] = wrap_angle(apart[2])
+    stated = ~(np.isnan(target) & np.isnan(other))
+    return bool(np.all(np.abs(apart[stated]) <= _SAME_TARGET))
+
+
+def _steering(campaign: Campaign) -> str:
+    """Return the mode in which a bench steered every trajectory, as its settings say; "" where each says its own."""
+    try:
+        stated = read_toml(campaign.path / _SETTINGS).get("steering", "")
+    except AgvbenchError:
+        return ""
+    return stated if stated in get_args(Steering) else ""
 
 
 def _vehicle(campaign: Campaign) -> VehicleModel:

@@ -20,6 +20,7 @@ from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import Fixed, StaticMap
 
 # The tangent diverges at 90°, and no vehicle has such an angle.
+_ROUNDING = 1e-9
 _LARGEST_ANGLE_RAD = math.radians(89.0)
 
 
@@ -142,11 +143,18 @@ class VehicleModel:
         VehicleError
             If an angle or the speed is out of reach, with the limit.
         """
-        return Command(
-            drive=self._inverse("drive", speed_mps),
-            front=self._inverse("front", front_rad),
-            rear=self._inverse("rear", rear_rad),
-        )
+        return self.steering_for(front_rad, rear_rad)._replace(drive=self._inverse("drive", speed_mps))
+
+    def steering_for(self, front_rad: float, rear_rad: float) -> Command:
+        """Return the command with these axle angles [rad], as `command_for` does, and the drive at neutral.
+
+        Raises
+        ------
+        VehicleError
+            If an angle is out of reach, with the limit.
+        """
+        front, rear = self._inverse("front", front_rad), self._inverse("rear", rear_rad)
+        return Command(drive=self.neutral.drive, front=front, rear=rear)
 
     def stop_after(self, command: Command) -> Command:
         """Return the command that stops the vehicle after `command`: the drive at neutral, the steering held.
@@ -176,12 +184,13 @@ class VehicleModel:
                 limit=error.limit if inside else f"{scale * low:.4g} … {scale * high:.4g} {unit}",
                 remedy=error.remedy,
             ) from None
-        if not channel.holds(command):
+        held = min(max(command, channel.low), channel.high)
+        if not math.isclose(held, command, rel_tol=_ROUNDING, abs_tol=_ROUNDING):
             raise VehicleError(
                 f"{role} {what} needs a command beyond its channel's range", where=f"vehicle {self.name}",
                 value=f"{scale * output:.4g} {unit} at {command:.4g}", limit=channel.range_text,
             )  # fmt: skip
-        return command
+        return held
 
     def effect(self, name: str) -> Effect | None:
         """Return the effect called `name`, if this model has it."""

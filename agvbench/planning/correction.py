@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from agvbench.planning.leg import Leg, axles_swept, stops
 from agvbench.planning.legs import legs_of
 from agvbench.planning.placement import check_fits
 from agvbench.planning.planner import Plan, commands_of, plan
-from agvbench.planning.shooting import shoot
+from agvbench.planning.shooting import Range, shoot
 from agvbench.planning.trajectories.trajectory import Trajectory
 from agvbench.planning.workspace import Workspace
 from agvbench.types import Commands, Floats, Pose
@@ -100,7 +101,7 @@ def corrected_plan(
         return rest_poses(model, [commands_of(each, model) for each in several], departure)
 
     aim = made.target.compose(NO_BIAS.relative_to(end_pose_bias))
-    shot = shoot(legs, model.front, model.rear, aim, ends)
+    shot = shoot(legs, _reach(model, "front"), _reach(model, "rear"), aim, ends)
     commands = commands_of(shot.legs, model)
     path = coasting_path(model, commands, departure)
     swept = axles_swept(path, model.geometry)
@@ -135,6 +136,16 @@ def depends_on_time(made: CorrectedPlan, model: VehicleModel, departure: Departu
 
 def _plain(made: Plan) -> CorrectedPlan:
     return CorrectedPlan(**vars(made))
+
+
+def _reach(model: VehicleModel, axle: Literal["front", "rear"]) -> Range:
+    """Return the smallest and the largest output of an axle's map to which its channel can be commanded."""
+    static_map, channel = getattr(model, axle), getattr(model.channels, axle)
+    low, high = static_map.output_range
+    if low == high:
+        return low, high
+    lowest, highest = sorted(float(static_map(end)) for end in (channel.low, channel.high))
+    return max(low, lowest), min(high, highest)
 
 
 def _beyond_camera(model: VehicleModel, commands: Commands, departure: Departure) -> Pose | None:

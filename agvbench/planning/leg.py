@@ -17,6 +17,8 @@ from agvbench.types import Floats, Pose, wrap_angle
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import body_motion
 
+_ROUNDING_RAD = 1e-9
+
 
 @dataclass(frozen=True)
 class Leg:
@@ -107,9 +109,10 @@ def sample(legs: Sequence[Leg], geometry: Geometry, step_s: float) -> Floats:
 
 
 def end_pose(path: Floats) -> Pose:
-    """Return the last pose of a path (n, 4) as `sample` returns it."""
+    """Return the last pose of a path (n, 4) as `sample` returns it; half a turn is +π, whatever its rounding."""
     x, y, heading = path[-1, 1:].tolist()
-    return Pose(x, y, wrap_angle(heading))
+    wrapped = wrap_angle(heading)
+    return Pose(x, y, math.pi if wrapped < _ROUNDING_RAD - math.pi else wrapped)
 
 
 def swept(legs: Sequence[Leg], geometry: Geometry) -> Floats:

@@ -156,7 +156,10 @@ def commands_of(legs: Sequence[Leg], model: VehicleModel) -> Commands:
 
 def _command(leg: Leg, model: VehicleModel) -> Command:
     try:
-        command = model.command_for(leg.front, leg.rear, leg.speed_mps)
+        if leg.is_rest:
+            # Neutral is what the drive's electronics take for a stop; a fitted map need not be zero there.
+            return model.stop_after(model.steering_for(leg.front, leg.rear))
+        return model.command_for(leg.front, leg.rear, leg.speed_mps)
     except (VehicleError, PlanError) as error:
         raise PlanError(
             f"speed {abs(leg.speed_mps):.3f} m/s cannot be commanded: {error.what}",
@@ -164,8 +167,6 @@ def _command(leg: Leg, model: VehicleModel) -> Command:
             limit=error.limit,
             remedy=error.remedy,
         ) from None
-    # Neutral is what the drive's electronics take for a stop; a fitted map need not be zero there.
-    return model.stop_after(command) if leg.is_rest else command
 
 
 Row = tuple[float, float, float, float]

@@ -15,7 +15,6 @@ import numpy as np
 
 from agvbench.planning.leg import Leg
 from agvbench.types import Floats, wrap_angle
-from agvbench.vehicle.maps import StaticMap
 
 HEADING_ARM_M = 0.5
 """A heading error counts as the position error that it makes at this distance [m]."""
@@ -30,6 +29,7 @@ _NEAR = 1.0
 # Play and dead bands can hide the steering's slopes at the plan; a few degrees off they show.
 _ELSEWHERE_RAD = ((0.07, 0.07), (-0.07, -0.07), (0.07, -0.07), (-0.07, 0.07))
 
+Range = tuple[float, float]
 Ends = Callable[[Sequence[Sequence[Leg]]], Floats]
 """From several lists of legs to where each ends, shape (n, 3)."""
 
@@ -53,7 +53,7 @@ class _Knob:
     name: str
 
 
-def shoot(legs: Sequence[Leg], front: StaticMap, rear: StaticMap, target: tuple[float, ...], ends: Ends) -> Shot:
+def shoot(legs: Sequence[Leg], front: Range, rear: Range, target: tuple[float, ...], ends: Ends) -> Shot:
     """Return `legs` changed so that they end at `target`, or as near as their limits allow.
 
     Parameters
@@ -61,7 +61,7 @@ def shoot(legs: Sequence[Leg], front: StaticMap, rear: StaticMap, target: tuple[
     legs
         As planned.
     front, rear
-        The maps of the axles, whose ranges are the limits.
+        The smallest and the largest angle [rad] (yaw rate [rad/s]) to which each axle can be commanded.
     target
         x [m], y [m], heading [rad] in the start frame.
     ends
@@ -173,7 +173,7 @@ class _ShootingProblem:
         return off
 
 
-def _divided(legs: Sequence[Leg], front: StaticMap, rear: StaticMap) -> list[Leg]:
+def _divided(legs: Sequence[Leg], front: Range, rear: Range) -> list[Leg]:
     """Return the legs, halved until there is enough to change about them for three equations."""
     pieces = list(legs)
     while len(_knobs(pieces, front, rear)) < 3:
@@ -186,16 +186,16 @@ def _halved(legs: Sequence[Leg]) -> list[Leg]:
     return [half for pair in halves for half in pair]
 
 
-def _knobs(legs: Sequence[Leg], front: StaticMap, rear: StaticMap) -> list[_Knob]:
+def _knobs(legs: Sequence[Leg], front: Range, rear: Range) -> list[_Knob]:
     knobs = []
     for i, leg in enumerate(legs):
         if leg.is_rest:
             continue
-        for field, angle, axle, static_map in (
+        for field, angle, axle, reach in (
             ("front", leg.front, "front", front),
             ("rear", leg.rear, "rear", rear),
         ):
-            low, high = (limit - angle for limit in static_map.output_range)
+            low, high = (limit - angle for limit in reach)
             if high > low:
                 low, high = max(low, -_LARGEST_TURN_RAD), min(high, _LARGEST_TURN_RAD)
                 ends = (min(low, 0.0) / _ANGLE_RAD, max(high, 0.0) / _ANGLE_RAD)

@@ -305,3 +305,13 @@ def test_measured_free_driving_gives_a_vehicle_like_the_real_one(tmp_path):
     # Straight ahead at throttle 0.25 it did 0.51 m/s on that day.
     assert float(model.drive(0.25)) == pytest.approx(0.51, abs=0.08)
     assert isinstance(next(iter(campaign)), Run)
+
+
+def test_a_short_sweep_is_calibrated_or_refused_in_one_line():
+    """None of the levels of a single sweep is held for long."""
+    t_s = np.arange(0.0, 10.0, 0.02)
+    commands = Commands(t_s, np.full(len(t_s), 0.35), np.linspace(-0.8, 0.8, len(t_s)), np.zeros(len(t_s)))
+    vehicle = Vehicle(lambda c: 0.4 * c, lambda c: 0.0, lambda c: 2.0 * c, front_m=0.06, rear_m=0.115)
+    frames = vehicle.frames(commands, np.random.default_rng(0), until_s=10.0, rate_hz=50.0)
+    with pytest.raises(FitError, match="too few different commands"):
+        calibrate(Runs([run_of(commands, frames, "sweep", "free")], **NORMALISED))

@@ -9,6 +9,7 @@ import pytest
 from calibration_samples import FRONT_M, REAR_M, Vehicle, frames_of, held, run_of, steady_poses
 
 from agvbench.calibration import measure_run
+from agvbench.calibration.measurement.windows import command_spread
 from agvbench.errors import FitError
 from agvbench.types import Commands, Frames
 from agvbench.vehicle.geometry import Geometry
@@ -144,3 +145,9 @@ def test_runs_that_say_nothing_are_one_clear_line():
     weaving = replace(run.frames, y_m=run.frames.y_m + 0.3 * np.sin(3 * run.frames.t_s))
     with pytest.raises(FitError, match="did not drive one arc"):
         measure_run(replace(run, frames=weaving), GEOMETRY)
+
+
+def test_a_command_between_times_before_the_first_one_is_not_known():
+    commands = Commands(np.array([0.0, 1.0]), np.array([1.0, 3.0]), np.zeros(2), np.zeros(2))
+    from_s, to_s = np.array([-0.5, 0.0, 0.0, 0.5]), np.array([-0.1, -0.1, 0.5, 1.5])
+    np.testing.assert_array_equal(command_spread(commands, "drive", from_s, to_s), [np.nan, np.nan, 0.0, 2.0])

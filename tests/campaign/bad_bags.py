@@ -181,4 +181,11 @@ CASES: Cases = {
     "tum-text": ("a TUM file with text in it", _tum(_POSES + "0.7 a 0 0 0 0 0 1\n", commands=recording())),
     "tum-empty": ("a TUM file without lines", _tum("# nothing\n", commands=recording())),
     "tum-backwards": ("poses whose time goes backwards", _tum(_POSES + _line(0.1), commands=recording())),
+    "tum-clocks": (
+        "poses since 1970 beside commands since the start",
+        _tum(
+            "".join(f"{1700000000 + row / 100:.2f} {row / 200} 0 0 0 0 0 1\n" for row in range(60)),
+            commands=recording(),
+        ),
+    ),
 }

@@ -175,3 +175,42 @@ def test_any_numbers_are_refused_in_one_line_or_make_a_mapping_that_loads(table,
         (directory / "m.toml").write_text(mapping, encoding="utf-8")
         lines = [load_mapping(directory / "m.toml").columns.x.column]
     assert len(lines) == 1
+
+
+def test_a_column_of_true_and_false_says_which_rows_count(tmp_path):
+    table, _ = written("plain")
+    recording = write_csv(tmp_path / "r.csv", table | {"armed": ["True" if t > 1.0 else "False" for t in table["t_s"]]})
+    text, questions = guess_mapping(recording)
+    (tmp_path / "mapping.toml").write_text(text, encoding="utf-8")
+    (run,) = import_recordings(tmp_path / "mapping.toml", [recording], tmp_path / "c")
+    assert len(run.frames) == pytest.approx(ROWS - RATE_HZ, abs=2)
+    assert "armed: do only rows with true count as driven?" in questions
+
+
+def test_the_unit_in_the_name_of_a_command_is_its_unit(tmp_path):
+    table, _ = written("plain")
+    table["steering_deg"] = [20.0 * value for value in table.pop("steering")]
+    table["speed_cmd (km/h)"] = [3.6 * value for value in table.pop("throttle")]
+    recording = write_csv(tmp_path / "r.csv", table)
+    text, _ = guess_mapping(recording)
+    (tmp_path / "mapping.toml").write_text(text, encoding="utf-8")
+    campaign = import_recordings(tmp_path / "mapping.toml", [recording], tmp_path / "c")
+    (run,) = campaign
+    assert campaign.header.channels == Channels.alike("si")
+    assert np.abs(run.commands.front).max() == pytest.approx(math.radians(20.0), rel=1e-3)
+    assert run.commands.drive.max() == pytest.approx(0.5, rel=1e-3)
+
+
+def test_an_axle_beyond_a_right_angle_is_asked_about(tmp_path):
+    table, _ = written("plain")
+    table["steering"] = [20.0 * value for value in table["steering"]]
+    _, questions = guess_mapping(write_csv(tmp_path / "r.csv", table))
+    assert any(question.startswith("steering: an axle at 20 rad?") for question in questions)
+
+
+def test_a_decimal_comma_is_guessed_behind_whole_numbers(tmp_path):
+    recording = write_csv(tmp_path / "r.csv", written("plain")[0], delimiter=";")
+    header, first, *rest = recording.read_text(encoding="utf-8").replace(".", ",").splitlines()
+    zeros = ";".join("0" for _ in first.split(";"))
+    recording.write_text("\n".join([header, zeros, *rest]) + "\n", encoding="utf-8")
+    assert 'decimal = ","' in guess_mapping(recording)[0]

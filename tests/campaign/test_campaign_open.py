@@ -160,3 +160,14 @@ def test_the_reference_shows_a_head_that_loads_and_names_every_column(tmp_path: 
     assert Campaign.open(tmp_path).header.prediction_stride_s == 0.5
     missing = [c.name for table in TABLES.values() for c in table if f"`{c.name}`" not in page]
     assert missing == []
+
+
+def test_a_clock_that_is_moved_takes_the_times_of_arrival_with_it(tmp_path):
+    """A first command at 30 s is time zero: a frame that took 20 ms to arrive still does."""
+    columns = tables()
+    for name in ("commands", "poses"):
+        columns[name]["t_s"] = [30.0 + t_s for t_s in columns[name]["t_s"]]
+    columns["poses"]["received_s"] = [t_s + 0.02 for t_s in columns["poses"]["t_s"]]
+    for run in Campaign.open(write_campaign(tmp_path / "c", columns)):
+        assert run.frames.t_s[0] == 0.0
+        np.testing.assert_allclose(run.frames.received_s - run.frames.t_s, 0.02, atol=1e-9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,8 +11,9 @@ import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
-from agvbench.metrics.planned_paths import PlannedPaths
+from agvbench.metrics.planned_paths import PlannedPaths, _is_same
 from agvbench.model import example_path
+from agvbench.types import NO_TARGET, Pose
 
 
 @pytest.fixture(scope="module")
@@ -45,3 +47,21 @@ def test_a_target_that_a_calibration_moved_by_a_tenth_of_a_millimetre_is_the_sam
     moved, other = (replace(run, target=run.target._replace(x_m=run.target.x_m + by)) for by in (1e-4, 1e-2))
     assert paths.of(moved) is not None
     assert paths.of(other) is None
+
+
+def test_half_a_turn_is_the_same_to_either_side():
+    target = Pose(1.0, 0.0, math.pi)
+    assert _is_same(target, target._replace(heading_rad=1e-4 - math.pi))
+    assert not _is_same(target, target._replace(heading_rad=0.1 - math.pi))
+    assert _is_same(NO_TARGET, NO_TARGET)
+    assert not _is_same(target, NO_TARGET)
+
+
+def test_a_bench_that_steered_every_trajectory_in_a_mode_has_its_paths(tmp_path):
+    options = ["--repeats", "1", "--trajectories", "5", "--steering", "front", "--exchange", "2", "--no-report"]
+    calibrated = ["--calibration", str(example_path("thesis")), "--conditions", "calibrated"]
+    command = [sys.executable, "-m", "agvbench", "bench", "trajectories", *options, *calibrated, "--out", "c"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (run,) = (run for run in Campaign.open(tmp_path / "c") if run.experiment == "trajectory")
+    assert PlannedPaths(Campaign.open(tmp_path / "c")).of(run) is not None

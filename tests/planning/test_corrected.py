@@ -1,23 +1,33 @@
 """Corrected plans, driven by plants of the simulator, whose equations are its own: the truth is not the planner's."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from agvbench.effects import SteeringLag, effect_kinds
+from agvbench.effects.axles.wheelbase_error import WheelbaseError
 from agvbench.effects.camera.mocap_scale import MocapScale
 from agvbench.effects.electronics.battery_droop import BatteryDroop
 from agvbench.effects.ground.floor_tilt import FloorTilt
 from agvbench.errors import PlanError
 from agvbench.model import VehicleModel
-from agvbench.planning import Departure, Workspace, corrected_plan, depends_on_time, load_trajectory, plan
+from agvbench.planning import (
+    Departure,
+    Workspace,
+    corrected_plan,
+    depends_on_time,
+    load_trajectory,
+    plan,
+    trajectory_from_table,
+)
 from agvbench.simulator.hidden import make_hidden_plant
 from agvbench.simulator.hidden.plant import HiddenPlant
 from agvbench.types import Pose
 from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
-from agvbench.vehicle.maps import MonotoneTable
+from agvbench.vehicle.maps import Fixed, Line, MonotoneTable
 
 REST_S = 4.0
 START = Pose(-0.4, 0.3, 0.7)
@@ -193,3 +203,16 @@ def test_the_corrected_path_stays_on_the_floor(calibrated):
 def test_a_single_turn_keeps_one_steering_angle_however_much_it_changes(calibrated):
     model = calibrated.with_effects(effect_kinds()["lateral_slip"](3.0))
     assert len(corrected_plan(load_trajectory("5"), model).commands) == 3
+
+
+@pytest.mark.parametrize(("radius_m", "at_limits"), [(0.5, ()), (0.475, ("front angle",))])
+def test_the_range_of_a_channel_limits_a_correction_as_an_end_stop_does(radius_m, at_limits):
+    alike = Channels.alike("normalised")
+    channels, line = replace(alike, front=replace(alike.front, low=-1.0, high=1.0)), Line(0.6, 0.0)
+    vehicle = VehicleModel("agv", Geometry(0.15, 0.15), channels, line, Fixed(command=0.0), Line(1.0, 0.0))
+    segments = [{"kind": "arc", "turn": "left", "radius_m": radius_m, "angle_deg": 90.0}]
+    turn = trajectory_from_table({"schema": 1, "name": "t", "steering": "front", "speed": 0.3, "segments": segments})
+    made = corrected_plan(turn, vehicle.with_effects(WheelbaseError(0.06)))
+    assert made.correction.at_limits == at_limits
+    assert made.correction.remaining.distance_m < (0.02 if at_limits else 1e-3) < made.correction.uncorrected.distance_m
+    assert np.abs(made.commands.front).max() <= 1.0

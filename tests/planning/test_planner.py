@@ -17,7 +17,7 @@ from agvbench.planning.shortest_paths.pieces import Piece
 from agvbench.types import Pose
 from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
-from agvbench.vehicle.maps import Line
+from agvbench.vehicle.maps import Line, MonotoneTable
 
 NOMINAL = nominal_model("agv", Geometry(FRONT_M, REAR_M), Channels.alike("us"))
 THESIS = thesis_vehicle()
@@ -343,3 +343,18 @@ def test_after_a_pause_other_steering_is_set_before_the_drive_starts(make):
     assert commands.drive.tolist() == [1500.0, 900.0, 1500.0, 1500.0, 900.0, 1500.0]
     assert np.allclose(np.diff(commands.t_s)[[0, 2, 3]], [0.5, 2.0, 0.5])
     assert commands.front[2] < 1500.0 < commands.front[3] == commands.front[4]
+
+
+def test_a_vehicle_that_no_command_but_neutral_stops_rests_at_neutral(make):
+    """Its calibration had no command between neutral and the slowest speed."""
+    creeping = dataclasses.replace(THESIS, drive=MonotoneTable((900.0, 1400.0), (0.3, 0.06), "linear"))
+    made = plan(make(speed=0.2, segments=[{"kind": "straight", "length_m": 1.0}]), creeping)
+    assert made.commands.drive[0] == made.commands.drive[-1] == 1500.0
+    assert made.target.x_m == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("full_mps", np.linspace(0.29, 0.36, 15))
+def test_half_a_turn_is_positive_whatever_its_rounding(full_mps):
+    drive = Line.through(1500.0, -float(full_mps) / 600.0, command_low=900.0, command_high=2100.0)
+    vehicle = dataclasses.replace(THESIS, drive=drive)
+    assert plan(load_trajectory("u_turn"), vehicle).target.heading_rad > 3.0

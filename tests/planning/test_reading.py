@@ -78,3 +78,15 @@ def test_a_directory_is_no_trajectory(tmp_path):
     (tmp_path / "x.toml").mkdir()
     with pytest.raises(FileError, match="cannot be read"):
         load_trajectory(tmp_path / "x.toml")
+
+
+def test_a_file_that_begins_with_the_name_of_another_trajectory_is_not_taken_for_it(tmp_path, monkeypatch):
+    own = tmp_path / "trajectories"
+    own.mkdir()
+    for name in ("slalom_fast", "5_laps"):
+        (own / f"{name}.toml").write_text(STRAIGHT.format(name=name, length=1.0))
+    monkeypatch.chdir(tmp_path)
+    assert load_trajectory("slalom").shape == "slalom"
+    assert load_trajectory("5").target.y_m != 0.0
+    with pytest.raises(FileError, match="there is no trajectory 'figure'; did you mean"):
+        load_trajectory("figure")

@@ -304,3 +304,17 @@ def test_a_statement_becomes_evaluations():
     assert found["camera_scale_ppm"] == Evaluation(200.0, "normal")
     assert found["clock_ms"].standard_uncertainty == pytest.approx(5.0 / math.sqrt(3.0))
     assert found["clock_ms"].degrees_of_freedom == 8.0
+
+
+def test_noise_that_one_frame_at_rest_does_not_show_is_not_stated():
+    rng = np.random.default_rng(2)
+    ends = scattered(rng, np.array([0.003, 0.0, 0.0]), 0.005, 10)
+    runs = [_with_one_frame_at_rest(run_to(end, rng, k)) for k, end in enumerate(ends)]
+    position = end_pose_budgets(runs)[0].budget
+    roles = {c.role for c in position.components if c.source.startswith("camera noise")}
+    assert roles == {Role.NOT_STATED}
+
+
+def _with_one_frame_at_rest(run):
+    before, after = np.flatnonzero(run.frames.t_s < 0.0)[-1:], np.flatnonzero(run.frames.t_s > 0.0)[-1:]
+    return replace(run, frames=run.frames.select(np.r_[before, after]))

@@ -75,4 +75,4 @@ def command_spread(commands: Commands, role: str, from_s: Floats, to_s: Floats) 
     values: Floats = getattr(commands, role)
     first = np.searchsorted(commands.t_s, from_s + 1e-9, side="right") - 1
     last = np.searchsorted(commands.t_s, to_s + 1e-9, side="right")
-    return np.array([np.ptp(values[a:b]) if a >= 0 else np.nan for a, b in zip(first, last, strict=True)])
+    return np.array([np.ptp(values[a:b]) if 0 <= a < b else np.nan for a, b in zip(first, last, strict=True)])

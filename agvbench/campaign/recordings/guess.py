@@ -11,6 +11,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 
 from agvbench.campaign.recordings.bags.bag import is_bag
 from agvbench.campaign.recordings.guess_bag import guess_bag_mapping
@@ -22,6 +23,7 @@ from agvbench.errors import FileError, OneOf
 from agvbench.types import Floats
 
 _DELIMITERS = ",;\t|"
+_LINES = 50
 _LONGEST_STEP_S, _SHORTEST_STEP_S = 0.5, 5e-4
 _FASTEST_MPS = 20.0
 _EPOCH_S = 1e8
@@ -43,7 +45,7 @@ def guess_mapping(path: Path | str) -> tuple[str, list[str]]:
     if path.suffix == ".tum":
         return _guess_tum(path)
     csv = _csv_of(path)
-    columns = Columns(path, _numbers(path, csv))
+    columns = _columns(path, path, csv)
     pose, motion = _pose(columns)
     return mapping_text(columns, [], _csv_table(csv), pose, motion), columns.questions
 
@@ -52,7 +54,7 @@ def _guess_tum(path: Path) -> tuple[str, list[str]]:
     """Return the mapping of a TUM file and of the CSV of its commands."""
     poses, beside = read_tum(path, PoseSource()), commands_beside(path)
     csv = _csv_of(beside)
-    columns = Columns(path, _numbers(beside, csv))
+    columns = _columns(path, beside, csv)
     time, unit, _ = _time(columns)
     is_absolute = poses.t_s[0] > _EPOCH_S
     tables = _csv_table(csv) | {"pose": [f'clock = "{"absolute" if is_absolute else "file"}"']}
@@ -86,32 +88,36 @@ def _pose(columns: Columns) -> tuple[list[str], Motion]:
 
 
 def _csv_of(path: Path) -> Csv:
-    """Return how a CSV is written, as its first two lines show: between other delimiters a comma is a decimal one."""
+    """Return how a CSV is written, as its first lines show: between other delimiters a comma is a decimal one."""
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
-            header, row = file.readline(1 << 16), file.readline(1 << 16)
+            header, *rows = [file.readline(1 << 16) for _ in range(_LINES)]
     except OSError as error:
         raise FileError(f"cannot be read ({error.strerror})", where=path, remedy="give a CSV recording") from None
     delimiter = max(_DELIMITERS, key=header.count)
-    has_comma = delimiter != "," and re.search(r"\d,\d", row) is not None
+    has_comma = delimiter != "," and any(re.search(r"\d,\d", row) for row in rows)
     return Csv(delimiter=delimiter, decimal="," if has_comma else ".")
 
 
-def _numbers(path: Path, csv: Csv) -> dict[str, Floats]:
-    """Return the columns that are numbers; an empty cell is NaN, and true and false are 1 and 0."""
-    table = read_csv_text(path, columns=(), delimiter=csv.delimiter, decimal=csv.decimal)
+def _columns(path: Path, values: Path, csv: Csv) -> Columns:
+    """Return the columns of a recording that are numbers, from the file of its values.
+
+    An empty cell is NaN, and true and false are 1 and 0.
+    """
+    table = read_csv_text(values, columns=(), delimiter=csv.delimiter, decimal=csv.decimal)
+    logical = frozenset(name for name in table.column_names if pa.types.is_boolean(table[name].type))
     found = {}
     for name in table.column_names:
         column = table[name]
         try:
-            values = np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
+            own = np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
         except (TypeError, ValueError):
             continue
-        if '"' not in name and "\\" not in name and np.isfinite(values).any():
-            found[name] = values
+        if '"' not in name and "\\" not in name and np.isfinite(own).any():
+            found[name] = own
     if not found or not len(next(iter(found.values()))):
-        raise FileError("has no rows of numbers", where=path, remedy="give a CSV recording with a header line")
-    return found
+        raise FileError("has no rows of numbers", where=values, remedy="give a CSV recording with a header line")
+    return Columns(path, found, logical=logical)
 
 
 def _time(columns: Columns) -> tuple[str, str, Floats]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.campaign.recordings.guess_channels import guess_channels, questions_about
+from agvbench.campaign.recordings.guess_channels import guess_channels, questions_about, stated_scale
 from agvbench.errors import FileError, OneOf
 from agvbench.types import Floats
 from agvbench.vehicle.channel_tables import channel_names
@@ -39,13 +39,14 @@ class Columns:
     """The numbers of a recording, and what was taken for what; ``taken`` are columns that have a role.
 
     ``keys`` are the keys of the mapping that name a column, where they are not ``column = "NAME"``; ``is_si`` says that
-    commands are in SI units.
+    commands are in SI units; ``logical`` are the columns of true and false.
     """
 
     path: Path
     numbers: Mapping[str, Floats]
     keys: Mapping[str, str] = field(default_factory=dict)
     is_si: bool = False
+    logical: frozenset[str] = frozenset()
     taken: dict[str, str] = field(default_factory=dict)
     questions: list[str] = field(default_factory=list)
 
@@ -156,10 +157,13 @@ def _commands(columns: Columns) -> list[str]:
     return [
         line
         for role, name in names.items()
-        for line in (
-            _flag(columns, role, name) if role in ("driven", "tracked") else [f"{role} = {{ {columns.key(name)} }}"]
-        )
+        for line in (_flag(columns, role, name) if role in ("driven", "tracked") else [_command(columns, role, name)])
     ]
+
+
+def _command(columns: Columns, role: str, name: str) -> str:
+    scale = stated_scale(name) or 1.0
+    return f"{role} = {{ {columns.key(name)}{'' if scale == 1.0 else f', scale = {scale:.9g}'} }}"
 
 
 def _vehicle(columns: Columns) -> tuple[list[str], dict[str, list[str]]]:
@@ -168,11 +172,12 @@ def _vehicle(columns: Columns) -> tuple[list[str], dict[str, list[str]]]:
     is_differential = bool(_TURNS.search(plain(front))) and "rear" not in columns.taken
     roles = ("drive", "front") if is_differential else ("drive", "front", "rear")
     names = {role: columns.taken.get(role, front) for role in roles}
-    commands = {role: columns.numbers[name] for role, name in names.items()}
-    channels = guess_channels(commands, is_si=columns.is_si or is_differential)
-    columns.questions += [
-        f"{names[role]}: {question}" for role, question in questions_about(channels).items() if role in columns.taken
-    ]
+    scales = {role: stated_scale(name) for role, name in names.items()}
+    commands = {role: (scales[role] or 1.0) * columns.numbers[name] for role, name in names.items()}
+    every_si = columns.is_si or is_differential
+    channels = guess_channels(commands, si=[role for role in roles if every_si or scales[role] is not None])
+    questions = questions_about(channels, has_axles=not is_differential)
+    columns.questions += [f"{names[role]}: {text}" for role, text in questions.items() if role in columns.taken]
     if is_differential:
         columns.questions.append("rear_axle_m: how far is the tracked point ahead of the axle of the driven wheels?")
         axles = ['kinematics = "differential"', "rear_axle_m = 0.0  # ? from the tracked point backward to the axle"]
@@ -195,8 +200,9 @@ def _flag(columns: Columns, role: str, name: str) -> list[str]:
     values = columns.numbers[name]
     if set(np.unique(values[np.isfinite(values)]).tolist()) != {0.0, 1.0}:
         return []
-    columns.questions.append(f"{name}: do only rows with 1 count as {role}?")
-    return [f"{role} = {{ {columns.key(name)}, equals = 1 }}"]
+    counted = "true" if name in columns.logical else "1"
+    columns.questions.append(f"{name}: do only rows with {counted} count as {role}?")
+    return [f"{role} = {{ {columns.key(name)}, equals = {counted} }}"]
 
 
 def _limits(t_s: Floats, position: Floats, heading_rad: Floats) -> tuple[float, float, float]:

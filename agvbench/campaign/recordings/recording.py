@@ -138,8 +138,8 @@ def combine(
         positions = (poses.x_m[seen], poses.y_m[seen], poses.heading_rad[seen])
         wild[seen] = jumped(poses.t_s[seen], *positions, mapping.gate)
     together = _together(commands, mapping.header(path))
-    if rows and len(together) and poses.t_s[-1] < together.t_s[0]:
-        raise _apart(path, poses, together)
+    if rows and len(together):
+        _require_common_time(path, poses, together)
     known_s = together.t_s[0] if len(together) else np.inf
     driven = flags.get("driven", every) & (poses.t_s >= known_s)
     stretches = np.zeros(rows, np.int64) if cut is None else cut
@@ -158,10 +158,21 @@ def _together(commands: Named[str, Series], header: CampaignHeader) -> Commands:
     return Commands(t_s=times[known], **{role: values[known] for role, values in held.items()})
 
 
-def _apart(path: Path, poses: Poses, commands: Commands) -> FileError:
-    ends_s, begins_s = poses.t_s[-1], commands.t_s[0]
-    return FileError(
-        "all poses are before the first command", where=path,
-        value=f"the last pose at {ends_s:.3f} s, the first command at {begins_s:.3f} s",
+def _require_common_time(path: Path, poses: Poses, commands: Commands) -> None:
+    """Raise `FileError` if all poses are before the first command, or long after the last of several."""
+    varies = any(np.ptp(getattr(commands, role)) > 0.0 for role in ROLES)
+    if poses.t_s[-1] < commands.t_s[0]:
+        what, pose, command = "before the first command", ("last", poses.t_s[-1]), ("first", commands.t_s[0])
+    elif varies and poses.t_s[0] > commands.t_s[-1] + _LONGEST_HELD_S:
+        what, pose, command = "long after the last command", ("first", poses.t_s[0]), ("last", commands.t_s[-1])
+    else:
+        return
+    raise FileError(
+        f"all poses are {what}", where=path,
+        value=f"the {pose[0]} pose at {pose[1]:.3f} s, the {command[0]} command at {command[1]:.3f} s",
         remedy='give both one clock: correct their times in the mapping (of a bag: time = "received" or "header")',
     )  # fmt: skip
+
+
+_LONGEST_HELD_S = 60.0
+"""A command that holds on for longer after the last of several, before the first pose, is another clock."""

@@ -82,11 +82,12 @@ class TimedTable:
         return first
 
     def shift(self, by_s: Floats) -> None:
-        """Subtract `by_s` (runs,) from the times of each run."""
-        if by_s.any():
-            t_s = self.column("t_s") - by_s[self.run_of_row]
-            self.table = self.table.set_column(self.table.column_names.index("t_s"), "t_s", pa.array(t_s))
-            self._columns["t_s"] = t_s
+        """Subtract `by_s` (runs,) from the times of each run: when a row was measured, and when it was received."""
+        for name in ("t_s", "received_s") if by_s.any() else ():
+            if name in self.table.column_names:
+                times = self.column(name) - by_s[self.run_of_row]
+                self.table = self.table.set_column(self.table.column_names.index(name), name, pa.array(times))
+                self._columns[name] = times
 
     def rows(self, index: int) -> slice:
         """Return the rows of run number `index`."""

@@ -49,10 +49,10 @@ def trajectory_file(name_or_path: str | Path, *, directory: Path | None = None) 
         return Path(name_or_path)
     files = trajectory_files(directory) if directory else [*_local_files(), *_shipped_files()]
     for file in files:
-        # The eight are called by number: reading one file is enough for them.
-        if file.stem == name_or_path or file.stem.split("_")[0] == name_or_path:
+        if file.stem == name_or_path:
             return file
-    for file in files:
+    # The eight are called by number, with which their files begin: reading one file is enough for them.
+    for file in sorted(files, key=lambda file: file.stem.split("_")[0] != name_or_path):
         if _read(file).name == name_or_path:
             return file
     raise FileError(

@@ -83,6 +83,8 @@ def enlargement_by_noise(repeats: Repeats) -> float:
     mean = repeats.error.mean(axis=0)
     deviations = repeats.error - mean
     scatter = float(np.sum(deviations**2)) / (len(repeats) - 1)
+    if not math.isfinite(repeats.noise_mm2):
+        return math.nan
     share = min(1.0, repeats.noise_mm2 / scatter) if scatter > 0.0 else 0.0
     without = mean + math.sqrt(1.0 - share) * deviations
-    return float(repeats.distance.mean() - np.hypot(*without.T).mean()) if math.isfinite(share) else math.nan
+    return float(repeats.distance.mean() - np.hypot(*without.T).mean())
