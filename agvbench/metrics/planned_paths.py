@@ -92,8 +92,8 @@ def _steering(campaign: Campaign) -> str:
     """Return the mode in which a bench steered every trajectory, as its settings say; "" where each says its own."""
     try:
         stated = read_toml(campaign.path / _SETTINGS).get("steering", "")
-    except AgvbenchError:
-        return ""
+    except (AgvbenchError, OSError, ValueError):
+        return ""  # another program's campaign has no settings of a bench
     return stated if stated in get_args(Steering) else ""
 
 

@@ -192,11 +192,18 @@ def _without_clouds(content: Content) -> Content:
 
 
 def _headline(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPosition]) -> Iterator[str]:
-    medians = {c: [end.median_mm[c] for end in ends if c in end.median_mm] for c in CONDITIONS}
-    positions = [f"{c} {statistics.fmean(found):.1f} mm" for c, found in medians.items() if found]
-    yield f"Median end position error, mean over trajectories: {', '.join(positions)}."
-    for quantity in COMPONENTS:
-        biases = {c: root_mean_square_bias(list(rows), quantity, c) for c in CONDITIONS}
+    driven = [c for c in CONDITIONS if any(c in end.median_mm for end in ends)]
+    # A mean over other trajectories is no gain: those that lack a condition are left out of all.
+    shared = [end for end in ends if all(c in end.median_mm for c in driven)]
+    if shared:
+        positions = [f"{c} {statistics.fmean(end.median_mm[c] for end in shared):.1f} mm" for c in driven]
+        yield f"Median end position error, mean over trajectories: {', '.join(positions)}."
+    if lacking := sorted({end.trajectory for end in ends} - {end.trajectory for end in shared}):
+        yield f"Not driven under every condition, and in none of these means: {', '.join(lacking)}."
+    everywhere = {end.trajectory for end in shared}
+    for quantity in COMPONENTS if shared else ():
+        compared = [row for row in rows if row.trajectory in everywhere]
+        biases = {c: root_mean_square_bias(compared, quantity, c) for c in driven}
         known = [f"{c} {b:.{quantity.digits}f} {quantity.unit}" for c, b in biases.items() if b == b]  # noqa: PLR0124
         yield f"Bias of {quantity.symbol}, root mean square over trajectories: {', '.join(known)}."
     found = counts(list(rows))

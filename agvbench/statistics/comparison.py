@@ -212,6 +212,12 @@ def compare_errors(
     """
     margins = checked_margins(margin_mm, margin_deg) | dict(further)
     cells, left_out = match_cells(a, b, conditions=conditions, same_campaign=same_campaign, quantities=tuple(margins))
+    left_out += [
+        f"{cell.trajectory} {cell.condition}: no {quantity.name}"
+        for quantity in further
+        for cell in cells
+        if not cell.has(quantity)
+    ]
     raw = raw_differences(cells, margins, resamples, seed)
     differences, tests = decide_families(raw, [*deciding, *further], alpha)
     shifts = sorted(map(end_shift, cells), key=lambda shift: -shift.length_mm)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from agvbench.errors import INTERNAL_ERROR_EXIT_CODE, FlagError
+from agvbench.errors import INTERNAL_ERROR_EXIT_CODE, FileError, FlagError
 from agvbench.running.configuration.benchmark_files import find_benchmark
 from agvbench.running.configuration.campaign_directory import choose_directory
 from agvbench.running.configuration.session_options import (
@@ -62,6 +63,7 @@ def run_benchmarks(
     if only:
         arguments += ["-k", only]
     if junit:
+        _require_writable(Path(junit))
         arguments += [f"--junitxml={junit}"]
     if not summary:
         arguments += ["--no-summary", "-q"]
@@ -80,6 +82,16 @@ def run_benchmarks(
     # Codes of pytest that agvbench uses for something else.
     own = {int(pytest.ExitCode.USAGE_ERROR): 2, int(pytest.ExitCode.INTERNAL_ERROR): INTERNAL_ERROR_EXIT_CODE}
     return own.get(int(code), int(code))
+
+
+def _require_writable(file: Path) -> None:
+    """Raise `FileError` if a file cannot be written: pytest would say so after the last run, and say nothing else."""
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with file.open("a"):
+            pass
+    except OSError as error:
+        raise FileError("cannot be written", where=f"--junitxml {file}", value=error.strerror) from None
 
 
 class _Ending:

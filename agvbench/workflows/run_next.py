@@ -18,6 +18,7 @@ from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.data.splits import split_runs
 from agvbench.diagnosis.proposal import NextExperiment
 from agvbench.errors import FileError, PlanError
+from agvbench.metrics.table import FILE as ERRORS
 from agvbench.model import VehicleModel
 from agvbench.planning import plan
 from agvbench.running.configuration.settings import SETTINGS_FILE, BenchSettings
@@ -34,7 +35,7 @@ _OF_THE_CAMPAIGN = frozenset({
     "repeats", "order", "full", "benchmarks", "only", "session",
 })  # fmt: skip
 _TABLES = {"runs", "commands", "poses"}
-_OF_BEFORE = {"campaign.toml", RESIDUALS}
+_OF_BEFORE = {"campaign.toml", RESIDUALS, ERRORS}
 
 
 def run_next(

@@ -93,3 +93,14 @@ def test_what_is_printed_is_one_short_line(campaign):
     compared = agvbench.compare(campaign, conditions=BOTH)
     assert str(compared).startswith("<Comparison of calibrated with uncalibrated: ")
     assert len(str(compared)) < 240
+
+
+def test_a_campaign_beside_itself_is_one_campaign(campaign):
+    alone, beside = agvbench.compare(campaign, conditions=BOTH), agvbench.compare(campaign, campaign, conditions=BOTH)
+    assert beside.differences == alone.differences
+    assert beside.notes == alone.notes
+
+
+def test_a_metric_that_was_not_measured_decides_nothing_and_is_refused(campaign):
+    with pytest.raises(InputError, match="--metrics: was not measured on both sides of any trajectory: energy"):
+        agvbench.compare(campaign, conditions=BOTH, metrics=["energy"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -65,3 +66,14 @@ def test_a_bench_that_steered_every_trajectory_in_a_mode_has_its_paths(tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     (run,) = (run for run in Campaign.open(tmp_path / "c") if run.experiment == "trajectory")
     assert PlannedPaths(Campaign.open(tmp_path / "c")).of(run) is not None
+
+
+def test_a_campaign_of_another_program_has_paths_without_settings_of_a_bench(campaign, tmp_path):
+    other = tmp_path / "other"
+    shutil.copytree(campaign.path, other)
+    for name in ("bench.toml", "SHA256SUMS"):
+        (other / name).unlink()
+    run = _runs(campaign)["5", "calibrated"]
+    assert PlannedPaths(Campaign.open(other)).of(run) is not None
+    (other / "bench.toml").write_bytes(b"\xff steering")
+    assert PlannedPaths(Campaign.open(other)).of(run) is not None

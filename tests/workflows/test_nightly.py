@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from agvbench.cli import main
 from agvbench.cli.driving.nightly import last_good
 from agvbench.errors import FileError
+from agvbench.metrics.gate import GateVerdict
+from agvbench.workflows.comparison.decision import FailurePolicy, exit_code
+from agvbench.workflows.run_next import _copy_what_else
 
 QUICK = ["-k", "trajectory and 1-un", "--repeats", "3", "--exchange", "2"]
 
@@ -79,3 +83,47 @@ def test_a_night_whose_name_is_a_path_is_refused_before_anything_is_driven(tmp_p
     assert main(["nightly", "--date", name]) == 2
     assert "--date: is no name of a directory" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_margins_are_for_the_comparison_and_not_for_the_bench(tmp_path, monkeypatch):
+    given = {}
+
+    def driven(names, options, **more):
+        given.update(options)
+        return 2
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("agvbench.workflows.bench.run_benchmarks", driven)
+    assert main(["nightly", "--margin-mm", "3", "--margin-deg", "2"]) == 2
+    assert given["margin_mm"] is given["margin_deg"] is None
+
+
+@pytest.mark.parametrize(("fail_on", "expected"), [(["regression"], 2), ([], 0)])
+def test_a_rule_that_passes_does_not_hide_that_nothing_could_be_compared(tmp_path, fail_on, expected):
+    gate = tmp_path / "gate.toml"
+    gate.write_text('schema = 1\n\n[[rules]]\nfail_on = "position_error.median>100mm"\n')
+    impossible = SimpleNamespace(could_compare=False, of=lambda verdict: [])
+    passed = SimpleNamespace(verdict=GateVerdict.PASS)
+    assert exit_code(impossible, FailurePolicy.parse(fail_on, gate), [passed]) == expected
+
+
+def test_a_file_for_results_that_cannot_be_written_is_refused_before_anything_is_driven(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    assert main(["bench", "--dry-run", "--junitxml", "file/results.xml"]) == 2
+    assert "--junitxml file/results.xml: cannot be written" in capsys.readouterr().err
+
+
+def test_a_plan_of_repeats_refuses_what_it_does_not_use(tmp_path, capsys):
+    assert main(["compare", str(tmp_path), "--plan", "--json", str(tmp_path / "c.json")]) == 2
+    assert "--json: says nothing with --plan" in capsys.readouterr().err
+
+
+def test_the_errors_of_the_campaign_before_are_not_those_of_the_next(tmp_path):
+    before, after = tmp_path / "before", tmp_path / "after"
+    for folder in (before, after):
+        folder.mkdir()
+    for name in ("errors.parquet", "provenance.parquet", "bench.toml"):
+        (before / name).touch()
+    _copy_what_else(before, after)
+    assert sorted(path.name for path in after.iterdir()) == ["bench.toml", "provenance.parquet"]

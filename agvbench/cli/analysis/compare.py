@@ -116,6 +116,11 @@ def _plan(arguments: argparse.Namespace, console: Console) -> int:
         raise FlagError(
             "plans a comparison with one campaign", where="--plan", value=arguments.b, remedy="leave it out"
         )
+    for name in ("conditions", "metrics", "gate", "json", "junit", "markdown"):
+        if getattr(arguments, name):
+            raise FlagError(
+                "says nothing with --plan, which compares nothing", where=f"--{name}", remedy="leave it out"
+            )
     in_mm, in_deg = margins(arguments)
     planned = plan_repeats(pose_errors(arguments.a), margin_mm=in_mm, margin_deg=in_deg, power=arguments.power)
     print_planned_repeats(console, planned, arguments.power)

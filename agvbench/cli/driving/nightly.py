@@ -122,6 +122,8 @@ def _bench(arguments: argparse.Namespace, night: Path, good: Path | None) -> int
         "out": str(night),
         "resume": has_session(night) or None,
         "gate": None,
+        "margin_mm": None,
+        "margin_deg": None,
         "no_report": True,
     }
     calibrated = good / "vehicle.toml" if good else None

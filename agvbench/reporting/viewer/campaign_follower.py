@@ -16,7 +16,7 @@ from agvbench.running.configuration.provenance import Row
 from agvbench.running.execution.event_log import EVENTS_TABLE
 
 _TABLES = ("runs", "commands", "poses")
-_BESIDE = (FILE_NAME, "vehicle.toml", "inputs.parquet")
+_BESIDE = (FILE_NAME, "bench.toml", "vehicle.toml", "inputs.parquet")
 
 
 class CampaignFollower:

@@ -77,7 +77,7 @@ class LiveVehicle:
             return
         if state.run.run_id != self._run:
             self._run, self._driven = state.run.run_id, []
-            self._log_plan(pose, None if plans is None else plans.plan(state.run.trajectory.partition("-")[0]))
+            self._log_plan(pose, None if plans is None else _plan(plans, state.run.trajectory))
         self._driven.append(pose)
         self._recording.log(f"{LIVE}/path", line(np.array(self._driven)[:, :2], _DRIVEN, 0.006))
 
@@ -91,3 +91,8 @@ class LiveVehicle:
             return
         self._recording.log(f"{LIVE}/plan", line(start.place(plan.expected[:, 1:3]), PLANNED, 0.003))
         self._recording.log(f"{LIVE}/target", arrow(start.compose(plan.target), PLANNED, 0.01))
+
+
+def _plan(plans: PlannedPaths, name: str) -> Plan | None:
+    """Return the plan of a run's trajectory; in closed loop, a controller's name follows that of the trajectory."""
+    return plans.plan(name) or plans.plan(name.rpartition("-")[0])

@@ -94,6 +94,7 @@ def compare(
     if other is None and pair is None:
         raise _alone(one)
     further = _further(metrics)
+    same_campaign = same_campaign or other is None or _are_same(one, other)
     errors_a = _errors(one, further, "a")
     compared = compare_errors(
         errors_a,
@@ -101,7 +102,7 @@ def compare(
         margin_mm=margin_mm,
         margin_deg=margin_deg,
         conditions=pair,
-        same_campaign=same_campaign or other is None,
+        same_campaign=same_campaign,
         deciding=deciding,
         further=further,
         names=names or _names(one, other, pair),
@@ -109,7 +110,25 @@ def compare(
         resamples=resamples,
         seed=seed,
     )
-    return _with_notes(compared, one, other, across_vehicles=across_vehicles)
+    _require_measured(compared, further)
+    is_itself = _are_same(one, other) and (pair is None or pair[0] == pair[1])
+    return _with_notes(compared, one, other, is_itself=is_itself, across_vehicles=across_vehicles)
+
+
+def _are_same(a: Campaign | pd.DataFrame, b: Campaign | pd.DataFrame | None) -> bool:
+    """Return whether two sides are one campaign."""
+    return isinstance(a, Campaign) and isinstance(b, Campaign) and is_same_campaign(a, b)
+
+
+def _require_measured(compared: Comparison, further: Mapping[Quantity, float]) -> None:
+    """Raise `InputError` if a metric that decides was measured nowhere on both sides."""
+    measured = {difference.quantity.name for difference in compared.differences}
+    for quantity in further:
+        if quantity.name not in measured:
+            raise InputError(
+                "was not measured on both sides of any trajectory", where="--metrics", value=quantity.column,
+                remedy="leave it out, or see what a campaign has with agvbench report",
+            )  # fmt: skip
 
 
 def _side(side: Comparable, where: str) -> Campaign | pd.DataFrame:
@@ -157,12 +176,17 @@ def _alone(side: Campaign | pd.DataFrame) -> FlagError:
 
 
 def _with_notes(
-    compared: Comparison, a: Campaign | pd.DataFrame, b: Campaign | pd.DataFrame | None, *, across_vehicles: bool
+    compared: Comparison,
+    a: Campaign | pd.DataFrame,
+    b: Campaign | pd.DataFrame | None,
+    *,
+    is_itself: bool,
+    across_vehicles: bool,
 ) -> Comparison:
     if not isinstance(a, Campaign) or not isinstance(b, Campaign | None):
         return compared
     known = comparability(a, b, across_vehicles=across_vehicles)
-    same = [_SAME_CAMPAIGN] if b is not None and is_same_campaign(a, b) else []
+    same = [_SAME_CAMPAIGN] if is_itself else []
     return replace(compared, cautions=known.sentences, remarks=(*compared.remarks, *same))
 
 

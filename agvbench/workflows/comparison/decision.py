@@ -90,6 +90,8 @@ def exit_code(
     failing = any(comparison.of(verdict) for verdict in policy.failing)
     if failing or any(check.verdict is GateVerdict.FAIL for check in checks):
         return 1
+    if not comparison.could_compare and policy.failing:
+        return 2
     open_checks = any(check.verdict is GateVerdict.INCONCLUSIVE for check in checks)
     return 3 if known.incomplete or open_checks else 0
 

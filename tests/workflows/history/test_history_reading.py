@@ -8,6 +8,7 @@ import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -20,6 +21,7 @@ from agvbench.errors import FlagError, InputError
 from agvbench.reporting.figures.history import draw_history
 from agvbench.vehicle.channels import Channels
 from agvbench.workflows.history.facts import changed, facts_of
+from agvbench.workflows.history.reading import _chosen
 from agvbench.workflows.history.result import write_json
 
 SAVED = Path(__file__).parents[2] / "campaign" / "data"
@@ -199,3 +201,9 @@ def test_json_has_steps_series_and_campaigns(stepped, tmp_path):
     few = agvbench.history(stepped / "night-00").to_json()
     assert few["series"][0]["sd"] is None
     assert few["headline"].startswith("No series has enough nights")
+
+
+def test_a_metric_and_a_condition_that_no_night_has_together_are_refused():
+    nights = SimpleNamespace(series=(("calibrated", "energy", "J"), ("uncalibrated", "position_error", "mm")))
+    with pytest.raises(FlagError, match="no night has both: energy and uncalibrated"):
+        _chosen(nights, "energy", "uncalibrated")
