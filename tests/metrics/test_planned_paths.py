@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-import shutil
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
-from agvbench.metrics.planned_paths import PlannedPaths, _is_same
+from agvbench.metrics.planned_paths import PlannedPaths, _is_same, _steering
 from agvbench.model import example_path
 from agvbench.types import NO_TARGET, Pose
 
@@ -68,12 +68,11 @@ def test_a_bench_that_steered_every_trajectory_in_a_mode_has_its_paths(tmp_path)
     assert PlannedPaths(Campaign.open(tmp_path / "c")).of(run) is not None
 
 
-def test_a_campaign_of_another_program_has_paths_without_settings_of_a_bench(campaign, tmp_path):
-    other = tmp_path / "other"
-    shutil.copytree(campaign.path, other)
-    for name in ("bench.toml", "SHA256SUMS"):
-        (other / name).unlink()
-    run = _runs(campaign)["5", "calibrated"]
-    assert PlannedPaths(Campaign.open(other)).of(run) is not None
-    (other / "bench.toml").write_bytes(b"\xff steering")
-    assert PlannedPaths(Campaign.open(other)).of(run) is not None
+@pytest.mark.parametrize(
+    ("settings", "mode"),
+    [(None, ""), (b"\xff steering", ""), (b'steering = "no"', ""), (b'steering = "front"', "front")],
+)
+def test_a_campaign_of_another_program_has_no_settings_of_a_bench(tmp_path, settings, mode):
+    if settings is not None:
+        (tmp_path / "bench.toml").write_bytes(settings)
+    assert _steering(SimpleNamespace(path=tmp_path)) == mode
