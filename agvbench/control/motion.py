@@ -99,6 +99,8 @@ class Actuation:
         return self.model.channels.limited(own)
 
     def _clipped(self, role: str, command: float) -> float:
+        if command == getattr(self.model.neutral, role):
+            return command  # a stop is a stop, even where no command near neutral was calibrated
         allowed = command_range(getattr(self.model.channels, role))
         known = getattr(self.model, role).command_range
         return _clip(command, (max(allowed[0], known[0]), min(allowed[1], known[1])))

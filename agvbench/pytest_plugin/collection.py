@@ -225,11 +225,26 @@ def _check_names(items: Iterable[pytest.Item]) -> None:
             raise pytest.UsageError(
                 f"{item.nodeid}: the run {name!r} would be taken for a further attempt at {other!r}; rename it"
             )
+        _check_length(item, name)
         if name in seen:
             raise pytest.UsageError(
                 f"two benchmarks would record the run {name!r}: {seen[name]} and {item.nodeid}; rename one"
             )
         seen[name] = item.nodeid
+
+
+def _check_length(item: pytest.Item, name: str) -> None:
+    """Refuse a run whose parts, and those of its further attempts, no file can be named after."""
+    from agvbench.campaign.tables.parts import part_name
+    from agvbench.errors import CampaignError
+
+    try:
+        part_name(f"{name}-attempt99-aborted99")
+    except CampaignError as error:
+        raise pytest.UsageError(
+            f"{item.nodeid}: the run {name[:40]!r}… has too long a name: {len(name)} characters, and "
+            f"'-attempt99-aborted99' behind them (limit: {error.limit}); give it a short id"
+        ) from None
 
 
 def _is_corrected(item: pytest.Item) -> bool:

@@ -9,16 +9,18 @@ from agvbench.types import Frames, Pose
 WINDOW_S = 0.4
 SPEED_LIMIT_MPS = 0.01
 """Decides while driving whether a run may begin or end: stricter than reading, `agvbench.statistics.rest_poses`."""
+YAW_RATE_LIMIT = np.radians(2.0)
 _FEWEST_FRAMES = 4
 LEAST_RATE_HZ = (_FEWEST_FRAMES + 1) / (WINDOW_S / 2)
 """A camera that looks less often than this cannot lose a frame and still say so."""
 
 
 def is_at_rest(frames: Frames, *, until_s: float, window_s: float = WINDOW_S) -> bool:
-    """Return whether the vehicle moved slower than 10 mm/s during the last `window_s` before `until_s`.
+    """Return whether the vehicle moved slower than 10 mm/s and turned slower than 2°/s in the last `window_s`.
 
     The speed is the distance between the median positions of the window's two halves over the time between
-    them, which 0.5 mm of noise moves by less than 2 mm/s at 120 Hz. Too few tracked frames count as moving.
+    them, which 0.5 mm of noise moves by less than 2 mm/s at 120 Hz. The yaw rate is found likewise, since a vehicle may
+    turn on the spot. Too few tracked frames count as moving.
     """
     age = until_s - frames.t_s
     recent = frames.tracked & (age >= 0.0) & (age <= window_s)
@@ -29,7 +31,10 @@ def is_at_rest(frames: Frames, *, until_s: float, window_s: float = WINDOW_S) ->
         np.median(frames.x_m[newer]) - np.median(frames.x_m[older]),
         np.median(frames.y_m[newer]) - np.median(frames.y_m[older]),
     )
-    return bool(moved / (window_s / 2) < SPEED_LIMIT_MPS)
+    turn = np.angle(np.exp(1j * (frames.heading_rad - frames.heading_rad[newer][-1])))
+    turned = abs(np.median(turn[newer]) - np.median(turn[older]))
+    limits = (moved, SPEED_LIMIT_MPS), (turned, YAW_RATE_LIMIT)
+    return all(change / (window_s / 2) < limit for change, limit in limits)
 
 
 def pose_before(frames: Frames, t_s: float) -> Pose | None:

@@ -123,7 +123,7 @@ def _latch(p: Floats, state: Floats, counters: np.ndarray, speed: float, yaw_rat
     half = 0.5 * p[ASSUMED_TRACK] * state[obeyed + 1]
     left, right = state[obeyed] - half, state[obeyed] + half
     too_fast = max(abs(left), abs(right)) / p[FASTEST]
-    share = (1.0 - p[DROOP] * state[HOURS]) / max(1.0, too_fast)
+    share = max(0.0, 1.0 - p[DROOP] * state[HOURS]) / max(1.0, too_fast)
     state[AIM_LEFT], state[AIM_RIGHT] = share * left, share * right
 
 

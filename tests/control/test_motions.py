@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from agvbench.types import Command
 from agvbench.vehicle.channels import Channels
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.kinematics import body_velocity
+from agvbench.vehicle.maps import MonotoneTable
 
 GEOMETRY = Geometry(front_axle_m=0.181, rear_axle_m=0.121)
 
@@ -89,3 +91,12 @@ def test_a_drive_of_which_only_full_speed_is_known_drives_at_full_speed():
 def test_a_differential_vehicle_stands_still_at_neutral():
     actuation = Actuation(example_vehicle("differential"), "front")
     assert actuation.command(Motion(0.0, 2.0)) == (0.0, 0.0, 0.0)
+
+
+def test_a_stop_is_a_stop_where_no_command_near_neutral_was_calibrated():
+    drive = MonotoneTable((900.0, 1000.0, 1200.0, 1400.0), (0.32, 0.31, 0.22, 0.12), "linear")
+    model = replace(example_vehicle("thesis"), drive=drive)
+    actuation = Actuation(model, "front")
+    assert actuation.command(Motion(0.0, 0.5)).drive == model.neutral.drive == 1500.0
+    assert actuation.clipped(model.neutral) == model.neutral
+    assert actuation.clipped(model.neutral._replace(drive=1450.0)).drive == 1400.0

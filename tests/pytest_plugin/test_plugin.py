@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from agvbench.model import example_path
+from agvbench.pytest_plugin.collection import _check_length
 
 pytest_plugins = ["pytester"]
 
@@ -304,3 +307,10 @@ def test_every_option_of_the_plugin_carries_its_name(pytester):
     assert "--agvbench-seed=N" in flags
     assert all(flag.startswith("--agvbench-") for flag in flags)
     assert "repeats(n" not in pytester.runpytest_subprocess("--markers").stdout.str()
+
+
+def test_a_run_whose_parts_no_file_can_be_named_after_is_refused():
+    item = SimpleNamespace(nodeid="bench_x.py::bench_x[...]")
+    _check_length(item, "x" * 170)
+    with pytest.raises(pytest.UsageError, match="has too long a name: 190 characters"):
+        _check_length(item, "x" * 190)

@@ -5,18 +5,22 @@ from __future__ import annotations
 import math
 import time
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
 from agvbench.campaign.names import planned_name
-from agvbench.control import Motion, PurePursuit, Stanley
+from agvbench.control import Motion, PurePursuit, Reference, Stanley
 from agvbench.errors import ControllerError, FlagError, PlanError
 from agvbench.model import example_path
+from agvbench.model.examples import example_vehicle
+from agvbench.planning import load_trajectory, plan
+from agvbench.running.execution.closed_loop import ClosedLoop, Control
 from agvbench.running.session.driver import NotDrivenError, RunRejectedError
 from agvbench.running.session.opening import open_session
-from agvbench.types import Command
+from agvbench.types import Command, Frames, Pose
 
 CALIBRATED = {"calibration": str(example_path("thesis")), "seed": 3}
 TABLES = ("runs", "commands", "poses")
@@ -294,3 +298,26 @@ def slow(reference, by_s):
     """Return a pure pursuit that takes `by_s` [s] each time."""
     controller = PurePursuit(reference)
     return lambda seen: (time.sleep(by_s), controller(seen))[1]
+
+
+@pytest.mark.parametrize("first_s", [0.0, 0.15])
+def test_a_vehicle_stands_while_a_controller_prepares_its_first_answer(first_s):
+    """The run's clock goes on: what is sent late is stated as late."""
+
+    class Slow:
+        calls = 0
+
+        def __call__(self, given):
+            self.calls += 1
+            time.sleep(first_s if self.calls == 1 else 0.0)
+            return Motion(0.2, 0.0) if given.t_s < 0.4 else None
+
+    model = example_vehicle("thesis")
+    control = Control(lambda *_: Slow(), Reference(plan(load_trajectory("1"), model), model), 0.1)
+    sent = list(ClosedLoop(control, "r", Pose(0.0, 0.0, 0.0), lock_step=False)([Frames.empty()]))
+    first, second = sent[:2]
+    assert first.t_s == 0.0
+    if first_s:
+        assert first.command.drive == model.neutral.drive
+        assert second.t_s >= first_s
+    assert all(later.t_s >= earlier.t_s + earlier.hold_s - 1e-9 for earlier, later in pairwise(sent))

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from agvbench.campaign import Campaign, CampaignHeader, CampaignWriter
+from agvbench.errors import SafetyStopError
+from agvbench.running.execution.run_records import RunRequest, record_aborted
 from agvbench.running.quality import assess
 from agvbench.running.rest_detection import is_at_rest, pose_before
-from agvbench.types import Frames, Pose
+from agvbench.types import Commands, Frames, Pose
+from agvbench.vehicle.channels import Channels
 
 RATE_HZ = 120.0
 BEGIN_S, MOVE_S, END_S = -0.5, 4.0, 6.0
@@ -79,3 +84,28 @@ def test_no_frames_is_no_rest_and_no_run():
     assert not is_at_rest(Frames.empty(), until_s=0.0)
     assert pose_before(Frames.empty(), 0.0) is None
     assert status(Frames.empty()).startswith("rejected: tracked share 0.00")
+
+
+@pytest.mark.parametrize(("turning_dps", "rests"), [(0.0, True), (0.5, True), (10.0, False), (-10.0, False)])
+def test_a_vehicle_that_turns_on_the_spot_is_not_at_rest(turning_dps, rests):
+    still = frames_of()
+    turned = np.radians(turning_dps) * (still.t_s - END_S)
+    heading = np.angle(np.exp(1j * (still.heading_rad + turned)))
+    assert is_at_rest(replace(still, heading_rad=heading), until_s=END_S) is rests
+
+
+@pytest.mark.parametrize("step_s", [3600.0, -3600.0])
+def test_a_run_that_a_step_of_the_camera_s_clock_ended_is_kept_until_then(tmp_path, step_s):
+    header = CampaignHeader(
+        schema=1, name="c", vehicle_name="agv", front_axle_m=0.18, rear_axle_m=0.12,
+        channels=Channels.alike("us"), mocap_rate_hz=RATE_HZ,
+    )  # fmt: skip
+    writer, seen = CampaignWriter.create(tmp_path / "c", header), frames_of()
+    late = seen.t_s > 2.0
+    stepped = replace(seen, t_s=np.where(late, seen.t_s + step_s, seen.t_s))
+    commands = Commands(np.array([0.0, MOVE_S]), np.array([900.0, 1500.0]), *np.full((2, 2), 1500.0))
+    request = RunRequest("r", "trajectory", "1", "calibrated", 1, commands, Pose(1.0, 0.0, 0.0), START)
+    record_aborted(writer, request, "r", 0.0, [stepped], SafetyStopError("the camera's clock stepped"), "1.0")
+    (run,) = Campaign.open(tmp_path / "c")
+    assert run.status.startswith("aborted: ")
+    assert len(run.frames) == np.count_nonzero(~late)

@@ -19,7 +19,7 @@ from agvbench.model import VehicleModel, example_vehicle
 from agvbench.model.examples import example_path
 from agvbench.planning import Workspace
 from agvbench.running.links import ContinuousLink
-from agvbench.running.positioning.automatic_return.turn_and_drive import TurnAndDrive
+from agvbench.running.positioning.automatic_return.turn_and_drive import TurnAndDrive, _to_both_sides
 from agvbench.running.session.opening import open_session
 from agvbench.running.supervision.supervisor import Supervisor
 from agvbench.types import Pose, wrap_angle
@@ -114,3 +114,10 @@ def test_a_session_needs_nobody(tmp_path: Path) -> None:
     assert runs["status"].tolist() == ["ok", "ok"]
     assert runs["placing_attempts"].iloc[1] >= 1
     assert (runs["placing_position_error_m"] <= 0.004).all()
+
+
+@pytest.mark.parametrize("reached", [(0.0, 0.6), (-0.5, -0.1)])
+def test_a_vehicle_that_drives_one_way_only_cannot_come_back(reached):
+    with pytest.raises(PlacingError, match="the vehicle cannot drive forward and backward"):
+        _to_both_sides("drive forward and backward", reached)
+    assert _to_both_sides("turn", (-0.5, 0.6)) == 0.5

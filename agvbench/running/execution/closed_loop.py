@@ -25,6 +25,7 @@ from agvbench.types import Command, Commands, Frames, Pose
 DEFAULT_PERIOD_S = 0.1
 _NAME = re.compile(r"[A-Za-z0-9_.-]{0,60}")
 _PERIODS_S = (0.02, 0.5)
+_LATE_S = 0.02
 """A camera of 100 Hz sees two frames in the shortest; a vehicle's host stops it after the longest."""
 
 
@@ -156,6 +157,10 @@ class ClosedLoop:
             if demand is None:
                 yield self._send(TimedCommand(sent_s, self._stop(), 0.0))
                 return
+            if not cycle and took_s > _LATE_S:
+                # The vehicle stood while the controller computed its first answer.
+                yield self._send(TimedCommand(0.0, self._stop(), took_s))
+                sent_s = took_s
             self._ages_s.append(sent_s - self._pose_t_s)
             cycle += 1 + int(took_s / period_s)
             yield self._send(TimedCommand(sent_s, self._command(demand), cycle * period_s - sent_s))

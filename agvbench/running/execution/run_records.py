@@ -11,6 +11,7 @@ import numpy as np
 from agvbench.campaign import CampaignWriter
 from agvbench.campaign.attempts import INTERRUPTED
 from agvbench.campaign.completeness import planned_id
+from agvbench.campaign.tables.consistency import CLOCK_TOLERANCE_S
 from agvbench.errors import CampaignError, SafetyStopError
 from agvbench.running.execution.closed_loop import ClosedLoop, Control
 from agvbench.running.execution.drive import Drive
@@ -86,6 +87,9 @@ def record_aborted(
 ) -> None:
     """Keep what was `seen` of a run that `error` ended; nothing where nothing was seen."""
     frames = Frames.concatenate(seen)
+    # A camera whose clock was set ends a run; what it said since then lies far outside the run.
+    last_s = float(request.commands.t_s[-1]) + CLOCK_TOLERANCE_S
+    frames = frames.select((frames.t_s >= -CLOCK_TOLERANCE_S) & (frames.t_s <= last_s))
     if not len(frames):
         return
     name = free_name(run_id + _ABORTED, writer.finished_ids)

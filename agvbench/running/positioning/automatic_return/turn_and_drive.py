@@ -72,7 +72,7 @@ class TurnAndDrive(PoseReturner):
 
     def _turn(self, seen: Pose, heading_rad: float, motion_interface: MotionInterface) -> Pose:
         """Turn on the spot to a heading; return where the vehicle stands then, and learn its pivot."""
-        fastest = min(_FASTEST_RADPS, 0.8 * min(map(abs, self._model.front.output_range)))
+        fastest = min(_FASTEST_RADPS, 0.8 * _to_both_sides("turn left and right", self._model.front.output_range))
 
         def error(pose: Pose) -> float:
             return wrap_angle(heading_rad - pose.heading_rad)
@@ -90,7 +90,8 @@ class TurnAndDrive(PoseReturner):
         course = math.atan2(there[1] - here[1], there[0] - here[0])
         c, s = math.cos(course), math.sin(course)
         heading = course if sign > 0.0 else course + math.pi
-        fastest = min(self._limits.fast_mps, 0.8 * min(map(abs, self._model.drive.output_range)))
+        reach = _to_both_sides("drive forward and backward", self._model.drive.output_range)
+        fastest = min(self._limits.fast_mps, 0.8 * reach)
         length = max(0.15, fastest * self._limits.die_off_s)
 
         def left_m(pose: Pose) -> float:
@@ -202,3 +203,14 @@ def _channel(model: VehicleModel, role: Role) -> Channel:
 def _rotation(heading_rad: float) -> Floats:
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     return np.array([[c, -s], [s, c]])
+
+
+def _to_both_sides(what: str, reached: tuple[float, float]) -> float:
+    """Return how far a range reaches to either side of zero; raise `PlacingError` if it does not."""
+    low, high = reached
+    if low >= 0.0 or high <= 0.0:
+        raise PlacingError(
+            f"the vehicle cannot {what}, as the way back needs", value=f"{low:g} … {high:g}",
+            remedy="put it there by hand",
+        )  # fmt: skip
+    return min(-low, high)
