@@ -210,7 +210,7 @@ def _to_both_sides(what: str, reached: tuple[float, float]) -> float:
     low, high = reached
     if low >= 0.0 or high <= 0.0:
         raise PlacingError(
-            f"the vehicle cannot {what}, as the way back needs", value=f"{low:g} … {high:g}",
+            f"the vehicle cannot {what}, as the return path needs", value=f"{low:g} … {high:g}",
             remedy="put it there by hand",
         )  # fmt: skip
     return min(-low, high)
