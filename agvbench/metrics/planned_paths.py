@@ -14,7 +14,7 @@ from agvbench.campaign.manifest import sha256
 from agvbench.campaign.names import planned_name
 from agvbench.errors import AgvbenchError
 from agvbench.metrics.measured_run import MeasuredRun
-from agvbench.model import VehicleModel, thesis_vehicle
+from agvbench.model import VehicleModel, nominal_model, thesis_vehicle
 from agvbench.planning import Plan, load_trajectory, plan, steered
 from agvbench.planning.trajectories.loading import trajectory_file
 from agvbench.planning.trajectories.segments import Steering
@@ -33,8 +33,8 @@ class PlannedPaths:
 
     An uncalibrated vehicle drives it at other times: those of its commands.
 
-    Without a ``vehicle.toml`` in the campaign, the thesis' vehicle with the campaign's axles is used. A trajectory
-    whose file is not the recorded one has no path.
+    Without a ``vehicle.toml`` in the campaign, the thesis' vehicle with the campaign's axles is used, or a nominal
+    differential one. A trajectory whose file is not the recorded one has no path.
     """
 
     def __init__(self, campaign: Campaign) -> None:
@@ -101,7 +101,10 @@ def _vehicle(campaign: Campaign) -> VehicleModel:
     try:
         return VehicleModel.load(campaign.path / "vehicle.toml")
     except AgvbenchError:
-        return replace(thesis_vehicle(), geometry=campaign.header.geometry)
+        geometry = campaign.header.geometry
+        if geometry.is_differential:
+            return nominal_model(campaign.header.vehicle_name, geometry, campaign.header.channels)
+        return replace(thesis_vehicle(), geometry=geometry)
 
 
 def _recorded_hashes(campaign: Campaign) -> Mapping[str, str]:

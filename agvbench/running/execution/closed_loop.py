@@ -25,7 +25,6 @@ from agvbench.types import Command, Commands, Frames, Pose
 DEFAULT_PERIOD_S = 0.1
 _NAME = re.compile(r"[A-Za-z0-9_.-]{0,60}")
 _PERIODS_S = (0.02, 0.5)
-_LATE_S = 0.02
 """A camera of 100 Hz sees two frames in the shortest; a vehicle's host stops it after the longest."""
 
 
@@ -157,7 +156,7 @@ class ClosedLoop:
             if demand is None:
                 yield self._send(TimedCommand(sent_s, self._stop(), 0.0))
                 return
-            if not cycle and took_s > _LATE_S:
+            if not cycle and took_s > period_s:
                 # The vehicle stood while the controller computed its first answer.
                 yield self._send(TimedCommand(0.0, self._stop(), took_s))
                 sent_s = took_s
