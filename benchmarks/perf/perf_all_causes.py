@@ -7,7 +7,9 @@ again without random variation, and the rms shift of the end positions is compar
 removal shifts them by at least three times the repeatability has to be named, or to be among the rivals of a name.
 
 The repeatability that a diagnosis states comes from few repeats of the test runs. The *known* repeatability is that of
-further repeats of the same runs by the simulated vehicle; the error is held against both.
+further repeats of the same runs by the simulated vehicle. A few test runs may scatter more or less than that: the error
+of a *perfect model* is the scatter of the test runs themselves about the mean of those repeats. The error is held
+against all three.
 """
 
 from __future__ import annotations
@@ -108,17 +110,25 @@ def end_position(plant: VehiclePlant, run: Run, seed: int) -> tuple[float, float
     return pose[:2]
 
 
-def known_repeatability_mm(vehicle: SimulatedVehicle, campaign: Campaign) -> float:
-    """Return the scatter of the end positions of the test runs in further repeats, rms over the runs [mm]."""
+def repeatability_mm(vehicle: SimulatedVehicle, campaign: Campaign) -> tuple[float, float]:
+    """Return the scatter of end positions about the mean of further repeats, rms over the test runs [mm].
+
+    First that of these repeats, then that of the test runs themselves: the error that a perfect model has on them. The
+    variance of the mean is taken out of the latter.
+    """
     neutral = campaign.header.neutral
     readings = read_runs([run for run in campaign if run.is_ok], neutral)
     test = split_runs(readings.runs, readings.group, neutral, 0).test
-    plant, variances = VehiclePlant(vehicle, 5), []
+    plant, variances, squares = VehiclePlant(vehicle, 5), [], []
     for k in np.flatnonzero(test):
         seeds = FURTHER_REPEATS * (int(k) + 1) + np.arange(FURTHER_REPEATS)
         ends = np.asarray([end_position(plant, readings.runs[k], int(seed)) for seed in seeds])
+        seen = readings.poses[k, np.isfinite(readings.poses[k, :, 0]), :2]
         variances.append(float(np.sum(np.var(ends, axis=0, ddof=1))))
-    return 1e3 * float(np.sqrt(np.mean(variances)))
+        squares.append(float(np.sum((seen[-1] - ends.mean(axis=0)) ** 2)))
+    known = float(np.mean(variances))
+    perfect = max(float(np.mean(squares)) - known / FURTHER_REPEATS, 0.0)
+    return 1e3 * float(np.sqrt(known)), 1e3 * float(np.sqrt(perfect))
 
 
 def shifts_mm(vehicle: SimulatedVehicle, runs: list[Run]) -> dict[str, float]:
@@ -156,7 +166,7 @@ class Answer:
 def judged(name: str, vehicle: SimulatedVehicle, campaign: Campaign, found: Diagnosis, seconds: float) -> Answer:
     """Hold a diagnosis against the truth."""
     errors = dict(found.held_out.errors["end_position_mm"]) if found.held_out is not None else {}
-    errors["known"] = known_repeatability_mm(vehicle, campaign)
+    errors["known"], errors["perfect"] = repeatability_mm(vehicle, campaign)
     runs = [run for run in campaign if run.is_ok]
     moved = shifts_mm(vehicle, runs)
     threshold = DECISIVE * errors.get("floor", float("nan"))
@@ -209,7 +219,7 @@ def line(answer: Answer) -> str:
         + (f", missed {', '.join(missed)}" if missed else "")
         + f"; true names {', '.join(answer.true_names) or 'none'}; wrong {', '.join(answer.wrong_names) or 'none'}; "
         f"{errors} mm, repeatability {answer.errors.get('floor', float('nan')):.1f}, "
-        f"known {answer.errors['known']:.1f}; {answer.seconds:.0f} s"
+        f"known {answer.errors['known']:.1f}, perfect model {answer.errors['perfect']:.1f}; {answer.seconds:.0f} s"
     )
 
 
@@ -222,7 +232,11 @@ def summary(answers: list[Answer]) -> str:
     checks = pd.Series([abs(v - t) <= 1.96 * s for a in answers for v, s, t in a.covered.values()], dtype=bool)
     ratios = {
         name: [a.errors["after"] / a.errors[key] for a in answers if a.errors.get(key) and "after" in a.errors]
-        for name, key in (("repeatability", "floor"), ("known repeatability", "known"))
+        for name, key in (
+            ("repeatability", "floor"),
+            ("known repeatability", "known"),
+            ("a perfect model's", "perfect"),
+        )
     }
     over = "; ".join(f"over {name}: median {np.median(r):.2f}, at most {np.max(r):.2f}" for name, r in ratios.items())
     return (

@@ -25,10 +25,10 @@ def kind(file: Path) -> TrialKind:
 def test_there_are_files():
     assert [file.name for file in FILES] == [
         "change-9841.json", "change-9881.json", "change-9931.json", "change-9941.json", "change-9951.json",
-        "change-9961.json", "change-9971.json", "change-9981.json", "differential-8000.json",
+        "change-9961.json", "change-9971.json", "change-9981.json", "change-9991.json", "differential-8000.json",
         "differential-8001.json", "differential-8002.json", "hysteresis-9040.json", "nothing-20168.json",
         "nothing-31200.json", "nothing-31500.json", "nothing-31800.json", "nothing-32100.json", "nothing-32400.json",
-        "nothing-32700.json", "nothing-32846.json", "vehicles-9030.json", "vehicles-9751.json",
+        "nothing-32700.json", "nothing-32846.json", "nothing-32975.json", "vehicles-9030.json", "vehicles-9751.json",
     ]  # fmt: skip
 
 
