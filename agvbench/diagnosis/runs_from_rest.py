@@ -128,13 +128,9 @@ class RunsFromRest(Method[SelectedFromRest]):
         if not every.is_improvable(begun):
             return selected
         again = replace(every.select(begun, map(cause_of, begun.names)), excluded=library.excluded)
-        try:
-            without, with_it = (
-                trained.score(model.names, model.fit.parameters, None) for model in (library.chosen, again.chosen)
-            )
-        except np.linalg.LinAlgError:
-            return selected  # the training runs alone do not determine them
-        if not predicts(with_it, without, readings.select(selected.split.validation)):
+        without, with_it = (trained.refitted(model) for model in (library.chosen, again.chosen))
+        validation = readings.select(selected.split.validation)
+        if without is None or with_it is None or not predicts(with_it, without, validation):
             return selected
         return replace(selected, library=with_other_forms(with_known_alternatives(again, library), every))
 

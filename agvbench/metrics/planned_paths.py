@@ -19,8 +19,9 @@ from agvbench.planning import Plan, load_trajectory, plan, steered
 from agvbench.planning.trajectories.loading import trajectory_file
 from agvbench.planning.trajectories.segments import Steering
 from agvbench.planning.trajectories.trajectory import TRAJECTORY_NAME
+from agvbench.statistics.matching import same_target
 from agvbench.text_files import read_toml
-from agvbench.types import Floats, Pose, Run, wrap_angle
+from agvbench.types import Floats, Run
 
 _SAME_TARGET = 1e-3
 """In m and rad: plans of two calibrations differ by micrometres where an axle stands a little off."""
@@ -49,7 +50,7 @@ class PlannedPaths:
         None if the trajectory is not known here, has changed, or leads to another target than the run had.
         """
         made = self.plan(planned_name(run))
-        if made is None or not _is_same(made.target, run.target):
+        if made is None or not same_target(made.target, run.target, _SAME_TARGET):
             return None
         return _as_commanded(made, run) if run.condition == "uncalibrated" else made.expected
 
@@ -78,14 +79,6 @@ def _as_commanded(made: Plan, run: Run) -> Floats:
         return made.expected
     t_s = np.interp(made.expected[:, 0], made.commands.t_s, run.commands.t_s)
     return np.column_stack([t_s, made.expected[:, 1:]])
-
-
-def _is_same(target: Pose, other: Pose) -> bool:
-    """Return whether two targets agree, or lack the same; half a turn is the same to either side."""
-    apart = np.array(target) - np.array(other)
-    apart[2] = wrap_angle(apart[2])
-    stated = ~(np.isnan(target) & np.isnan(other))
-    return bool(np.all(np.abs(apart[stated]) <= _SAME_TARGET))
 
 
 def _steering(campaign: Campaign) -> str:

@@ -19,8 +19,8 @@ from agvbench.vehicle.channels import Channel, Channels, channels_of, quantity_o
 from agvbench.vehicle.geometry import Geometry
 from agvbench.vehicle.maps import Fixed, StaticMap
 
-# The tangent diverges at 90°, and no vehicle has such an angle.
 _ROUNDING = 1e-9
+# The tangent diverges at 90°, and no vehicle has such an angle.
 _LARGEST_ANGLE_RAD = math.radians(89.0)
 
 
@@ -68,6 +68,7 @@ class VehicleModel:
         object.__setattr__(self, "effects", tuple(self.effects))
         object.__setattr__(self, "provenance", dict(self.provenance))
         object.__setattr__(self, "priors", tuple(self.priors))
+        self._check_rear()
         self._check_angles()
         stated = [prior.name for prior in self.priors]
         for name in stated:
@@ -103,7 +104,7 @@ class VehicleModel:
             remedy="remove the effect, or correct geometry.kinematics",
         )
 
-    def _check_angles(self) -> None:
+    def _check_rear(self) -> None:
         if self.geometry.is_differential and not isinstance(self.rear, Fixed):
             raise VehicleError(
                 "a differential vehicle steers no rear axle",
@@ -112,6 +113,8 @@ class VehicleModel:
                 limit='kind = "fixed"',
                 remedy="correct the map, or geometry.kinematics",
             )
+
+    def _check_angles(self) -> None:
         for axle in ("rear",) if self.geometry.is_differential else ("front", "rear"):
             ends = [end for end in getattr(self, axle).output_range if math.isfinite(end)]
             for end in ends:

@@ -30,6 +30,7 @@ _NEAR = 1.0
 _ELSEWHERE_RAD = ((0.07, 0.07), (-0.07, -0.07), (0.07, -0.07), (-0.07, 0.07))
 
 Range = tuple[float, float]
+"""The smallest and the largest angle [rad] (yaw rate [rad/s]) of an axle."""
 Ends = Callable[[Sequence[Sequence[Leg]]], Floats]
 """From several lists of legs to where each ends, shape (n, 3)."""
 

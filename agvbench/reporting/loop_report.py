@@ -191,7 +191,8 @@ def _without_clouds(content: Content) -> Content:
     return replace(content, blocks=blocks)
 
 
-def _headline(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPosition]) -> Iterator[str]:
+def _means(rows: Sequence[BeforeAfter], ends: Sequence[EndPosition]) -> Iterator[str]:
+    """Yield the means of error and biases over the trajectories that were driven under every condition."""
     driven = [c for c in CONDITIONS if any(c in end.median_mm for end in ends)]
     # A mean over other trajectories is no gain: those that lack a condition are left out of all.
     shared = [end for end in ends if all(c in end.median_mm for c in driven)]
@@ -201,11 +202,15 @@ def _headline(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPositio
     if lacking := sorted({end.trajectory for end in ends} - {end.trajectory for end in shared}):
         yield f"Not driven under every condition, and in none of these means: {', '.join(lacking)}."
     everywhere = {end.trajectory for end in shared}
+    compared = [row for row in rows if row.trajectory in everywhere]
     for quantity in COMPONENTS if shared else ():
-        compared = [row for row in rows if row.trajectory in everywhere]
         biases = {c: root_mean_square_bias(compared, quantity, c) for c in driven}
         known = [f"{c} {b:.{quantity.digits}f} {quantity.unit}" for c, b in biases.items() if b == b]  # noqa: PLR0124
         yield f"Bias of {quantity.symbol}, root mean square over trajectories: {', '.join(known)}."
+
+
+def _headline(loop: Loop, rows: Sequence[BeforeAfter], ends: Sequence[EndPosition]) -> Iterator[str]:
+    yield from _means(rows, ends)
     found = counts(list(rows))
     total = sum(found.values())
     yield (

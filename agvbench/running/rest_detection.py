@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from agvbench.types import Frames, Pose
+from agvbench.types import Frames, Pose, wrap_angle
 
 WINDOW_S = 0.4
 SPEED_LIMIT_MPS = 0.01
 """Decides while driving whether a run may begin or end: stricter than reading, `agvbench.statistics.rest_poses`."""
-YAW_RATE_LIMIT = np.radians(2.0)
+YAW_RATE_LIMIT_RADPS = np.radians(2.0)
 _FEWEST_FRAMES = 4
 LEAST_RATE_HZ = (_FEWEST_FRAMES + 1) / (WINDOW_S / 2)
 """A camera that looks less often than this cannot lose a frame and still say so."""
@@ -31,10 +31,10 @@ def is_at_rest(frames: Frames, *, until_s: float, window_s: float = WINDOW_S) ->
         np.median(frames.x_m[newer]) - np.median(frames.x_m[older]),
         np.median(frames.y_m[newer]) - np.median(frames.y_m[older]),
     )
-    turn = np.angle(np.exp(1j * (frames.heading_rad - frames.heading_rad[newer][-1])))
+    turn = wrap_angle(frames.heading_rad - frames.heading_rad[newer][-1])
     turned = abs(np.median(turn[newer]) - np.median(turn[older]))
-    limits = (moved, SPEED_LIMIT_MPS), (turned, YAW_RATE_LIMIT)
-    return all(change / (window_s / 2) < limit for change, limit in limits)
+    half_s = window_s / 2
+    return bool(moved / half_s < SPEED_LIMIT_MPS and turned / half_s < YAW_RATE_LIMIT_RADPS)
 
 
 def pose_before(frames: Frames, t_s: float) -> Pose | None:

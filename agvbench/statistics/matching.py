@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from agvbench.errors import InputError, OneOf
 from agvbench.statistics.quantities import ACROSS, ALONG, QUANTITIES, Quantity
@@ -147,11 +147,14 @@ def _of_condition(errors: pd.DataFrame, condition: str, side: str) -> pd.DataFra
     return chosen
 
 
-def same_target(a: Floats, b: Floats) -> bool:
-    """Return whether two targets (x [m], y [m], heading [rad]) agree within 1 mm and 0.1°."""
-    apart = a - b
+def same_target(a: ArrayLike, b: ArrayLike, tolerance: ArrayLike = _TARGET_TOLERANCE) -> bool:
+    """Return whether two targets (x [m], y [m], heading [rad]) agree, by default within 1 mm and 0.1°.
+
+    Half a turn is the same to either side. A number that both lack agrees.
+    """
+    apart = np.subtract(a, b)
     apart[2] = np.angle(np.exp(1j * apart[2]))
-    return bool(np.all(np.abs(apart) <= _TARGET_TOLERANCE))
+    return bool(np.all((np.abs(apart) <= tolerance) | (np.isnan(a) & np.isnan(b))))
 
 
 def _share_sessions(a: Side, b: Side) -> bool:

@@ -57,12 +57,9 @@ def main() -> int:
                 answers.add(answer)
                 print(f"{threads} threads: {float(taken):.1f} s", flush=True)
     ratio = statistics.median(times[1]) / statistics.median(times[wanted.threads])
-    print(f"{wanted.threads} threads: {ratio:.2f} times faster than one; the answer is {_same(len(answers))}")
+    same = "the same" if len(answers) == 1 else "not the same"
+    print(f"{wanted.threads} threads: {ratio:.2f} times faster than one; the answer is {same}")
     return int(len(answers) > 1)
-
-
-def _same(answers: int) -> str:
-    return "the same" if answers == 1 else "not the same"
 
 
 if __name__ == "__main__":

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from agvbench.campaign import Campaign
-from agvbench.metrics.planned_paths import PlannedPaths, _is_same, _steering
+from agvbench.metrics.planned_paths import _SAME_TARGET, PlannedPaths, _steering
 from agvbench.model import example_path
+from agvbench.statistics.matching import same_target
 from agvbench.types import NO_TARGET, Pose
 
 
@@ -52,10 +53,10 @@ def test_a_target_that_a_calibration_moved_by_a_tenth_of_a_millimetre_is_the_sam
 
 def test_half_a_turn_is_the_same_to_either_side():
     target = Pose(1.0, 0.0, math.pi)
-    assert _is_same(target, target._replace(heading_rad=1e-4 - math.pi))
-    assert not _is_same(target, target._replace(heading_rad=0.1 - math.pi))
-    assert _is_same(NO_TARGET, NO_TARGET)
-    assert not _is_same(target, NO_TARGET)
+    assert same_target(target, target._replace(heading_rad=1e-4 - math.pi), _SAME_TARGET)
+    assert not same_target(target, target._replace(heading_rad=0.1 - math.pi), _SAME_TARGET)
+    assert same_target(NO_TARGET, NO_TARGET, _SAME_TARGET)
+    assert not same_target(target, NO_TARGET, _SAME_TARGET)
 
 
 def test_a_bench_that_steered_every_trajectory_in_a_mode_has_its_paths(tmp_path):

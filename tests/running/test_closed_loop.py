@@ -302,7 +302,7 @@ def slow(reference, by_s):
 
 @pytest.mark.parametrize("first_s", [0.0, 0.15])
 def test_a_vehicle_stands_while_a_controller_prepares_its_first_answer(first_s):
-    """The run's clock goes on: what is sent late is stated as late."""
+    """The run's clock continues: what is sent late is stated as late."""
 
     class Slow:
         calls = 0

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from agvbench.campaign.recordings.mapping import ANGLE, LENGTH
 from agvbench.types import CommandUnit, Floats
 from agvbench.vehicle.channel_tables import si_unit
 
@@ -16,9 +17,9 @@ _LOWEST_PULSE_US, _HIGHEST_PULSE_US = 400.0, 2600.0
 _PER_S = r"(_s|/s|ps|_per_s)"
 _STATED_UNITS = {
     rf"rad{_PER_S}?|m{_PER_S}": 1.0,
-    rf"deg(rees)?{_PER_S}?": math.pi / 180.0,
-    rf"mm{_PER_S}": 1e-3,
-    rf"cm{_PER_S}": 1e-2,
+    rf"deg(rees)?{_PER_S}?": ANGLE["deg"],
+    rf"mm{_PER_S}": LENGTH["mm"],
+    rf"cm{_PER_S}": LENGTH["cm"],
     r"km_?/?h|kph": 1.0 / 3.6,
 }
 _RIGHT_ANGLE_RAD = 0.5 * math.pi

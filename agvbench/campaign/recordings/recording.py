@@ -160,19 +160,21 @@ def _together(commands: Named[str, Series], header: CampaignHeader) -> Commands:
 
 def _require_common_time(path: Path, poses: Poses, commands: Commands) -> None:
     """Raise `FileError` if all poses are before the first command, or long after the last of several."""
+    begin_s, end_s = poses.t_s[0], poses.t_s[-1]
+    first_s, last_s = commands.t_s[0], commands.t_s[-1]
+    if end_s < first_s:
+        told = f"the last pose at {end_s:.3f} s, the first command at {first_s:.3f} s"
+        raise _apart(path, "all poses are before the first command", told)
     varies = any(np.ptp(getattr(commands, role)) > 0.0 for role in ROLES)
-    if poses.t_s[-1] < commands.t_s[0]:
-        what, pose, command = "before the first command", ("last", poses.t_s[-1]), ("first", commands.t_s[0])
-    elif varies and poses.t_s[0] > commands.t_s[-1] + _LONGEST_HELD_S:
-        what, pose, command = "long after the last command", ("first", poses.t_s[0]), ("last", commands.t_s[-1])
-    else:
-        return
-    raise FileError(
-        f"all poses are {what}", where=path,
-        value=f"the {pose[0]} pose at {pose[1]:.3f} s, the {command[0]} command at {command[1]:.3f} s",
-        remedy='give both one clock: correct their times in the mapping (of a bag: time = "received" or "header")',
-    )  # fmt: skip
+    if varies and begin_s > last_s + _LONGEST_HELD_S:
+        told = f"the first pose at {begin_s:.3f} s, the last command at {last_s:.3f} s"
+        raise _apart(path, "all poses are long after the last command", told)
+
+
+def _apart(path: Path, what: str, told: str) -> FileError:
+    remedy = 'give both one clock: correct their times in the mapping (of a bag: time = "received" or "header")'
+    return FileError(what, where=path, value=told, remedy=remedy)
 
 
 _LONGEST_HELD_S = 60.0
-"""A command that holds on for longer after the last of several, before the first pose, is another clock."""
+"""A last command that has been held for longer before the first pose is of another clock."""

@@ -11,6 +11,8 @@ from agvbench.diagnosis.criteria import DATA
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.errors import CampaignError
 
+NEVER_DRIVEN = "the drive was never commanded anything but neutral"
+
 
 def insufficient_data(readings: Readings, header: HeaderLike) -> str:
     """Return why this campaign cannot be diagnosed, or an empty string.
@@ -32,7 +34,7 @@ def insufficient_data(readings: Readings, header: HeaderLike) -> str:
         )
     commands = [run.commands for run in readings.runs]
     if all(np.all(c.drive == header.neutral.drive) for c in commands):
-        return "the drive was never commanded anything but neutral"
+        return NEVER_DRIVEN
     if len({(f, r) for c in commands for f, r in zip(c.front.tolist(), c.rear.tolist(), strict=True)}) == 1:
         return "steering was never excited: its commands are the same in all runs"
     _, sizes = np.unique(readings.group, return_counts=True)

@@ -171,18 +171,16 @@ class LevenbergMarquardt:
         last step has derivatives of its own: where residuals are large, others lead to another point. A step to where
         the model cannot be evaluated is undone, and ends the iteration.
         """
-        before, known, own = np.inf, state, None
+        before, own = np.inf, None
+        known: FitState | None = None
         for step in range(iterations):
             try:
                 evaluation = self.evaluate(state, own if near is None else near)
-            except np.linalg.LinAlgError:
-                if known is state:
-                    raise
-                return Iterated(known, Convergence.CONVERGED, None)
-            known, reduction = state, before - evaluation.loss
-            try:
+                known, reduction = state, before - evaluation.loss
                 state, taken = self._step(state, evaluation)
             except np.linalg.LinAlgError:
+                if known is None:
+                    raise
                 return Iterated(known, Convergence.CONVERGED, None)
             before = evaluation.loss
             if near is not None:

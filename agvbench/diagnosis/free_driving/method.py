@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.checks.sufficiency import NEVER_DRIVEN
 from agvbench.diagnosis.context import require_runs
 from agvbench.diagnosis.criteria import DATA, SESSION_CLOCK
 from agvbench.diagnosis.data.initial_pose import is_driven
@@ -95,7 +96,7 @@ class FreeDriving(Method[SelectedFromWindows]):
             return f"{stretches} stretches of {self.horizon.block_s:g} s are too few for a test: drive for longer"
         is_differential, neutral = self.context.geometry.is_differential, self.context.header.neutral
         if not any(is_driven(run.commands, neutral, turns_on_the_spot=is_differential).any() for run in readings.runs):
-            return "the drive was never commanded anything but neutral"
+            return NEVER_DRIVEN
         turned = np.nanmax(np.abs(readings.poses[..., 2] - readings.start[:, None, 2]), axis=1)
         if np.count_nonzero(turned > DATA.min_turn_rad) < DATA.min_blocks:
             return "steering was never excited: hardly a window turns"

@@ -44,7 +44,7 @@ def separate_lag_from_delay(selection: Selection, selector: Selector) -> Selecti
     slow = [name for name in chosen.names if cause_of(name) in which and name not in selector.given]
     if _SPEED not in {cause_of(name) for name in (*chosen.names, *selector.given)}:
         which = (*which, _SPEED)
-    if not slow or {*which} & {cause_of(name) for name in selector.given}:
+    if not slow or {*which} & selector.given_causes:
         return selection
     extended = with_extended_library(selector)
     separate = _with_lag_and_delay(extended, chosen, slow)
@@ -80,7 +80,7 @@ def separate_channels(selection: Selection, selector: AnySelector) -> tuple[Sele
     chosen = selection.chosen
     slow = [name for name in chosen.names if cause_of(name) in (CAMERA, *MOTORS) and name not in selector.given]
     has_common_delay = {CAMERA, DELAY} & {cause_of(name) for name in slow}
-    if not has_common_delay or {*MOTORS} & {cause_of(name) for name in selector.given}:
+    if not has_common_delay or {*MOTORS} & selector.given_causes:
         return selection, selector
     extended = with_extended_library(selector)
     model = _with_channels(extended, chosen, slow)
@@ -230,7 +230,7 @@ def prefer_actuators(selection: Selection, selector: Selector) -> Selection:
     extended = with_extended_library(selector)
     without = extended.without_effect(selection.base, chosen, camera)
     every = _with_actuators(extended, without)
-    if selector.batch.geometry.is_differential and not {*MOTORS} & {cause_of(name) for name in selector.given}:
+    if selector.batch.geometry.is_differential and not {*MOTORS} & selector.given_causes:
         # The camera resembles the lags of both motors together, and none of them alone.
         slow = [name for name in chosen.names if cause_of(name) in (CAMERA, *MOTORS) and name not in selector.given]
         joint = _with_lag_and_delay(extended, chosen, slow)

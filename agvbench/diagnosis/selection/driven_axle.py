@@ -42,7 +42,7 @@ def better_driven_axle(selection: Selection, selector: Selector) -> Driven | Non
         return None
     if not (any(map(_is_of_turns, chosen.names)) or may_have_structure(chosen, selector.seed)):
         return None
-    deviances = {axle: _with_driven_axle(chosen, selector, axle) for axle in _AXLES if axle != UNDECLARED}
+    deviances = {axle: _deviance_with(axle, chosen, selector) for axle in _AXLES if axle != UNDECLARED}
     best, other = sorted(deviances, key=lambda axle: deviances[axle])
     is_better = deviances[best] < chosen.deviance - SELECTION.min_gain
     return best if is_better and deviances[other] > chosen.deviance + SELECTION.min_gain else None
@@ -54,8 +54,8 @@ def _is_of_turns(name: str) -> bool:
     return cause_of(name) == "cornering_speed_loss" or (kind is not None and kind.needs_both_axles_driven)
 
 
-def _with_driven_axle(chosen: ScoredModel, selector: Selector, axle: Driven) -> float:
-    """Return the deviance of the chosen model with one driven axle, less the effects on the speed in turns.
+def _deviance_with(axle: Driven, chosen: ScoredModel, selector: Selector) -> float:
+    """Return the deviance of the chosen model with one driven `axle`, less the effects on the speed in turns.
 
     It is infinite where the fit diverges.
     """

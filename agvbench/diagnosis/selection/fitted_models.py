@@ -19,6 +19,7 @@ from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, default_candidate
 from agvbench.effects import effect_kinds
+from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
 _AT_BOUND = 1e-3
@@ -130,6 +131,11 @@ class FittedModels:
 
     def __post_init__(self) -> None:
         self._fold = folds(fold_groups(self.batch.readings), FOLDS, self.seed)
+
+    @property
+    def given_causes(self) -> set[str]:
+        """What the vehicle is known to have: the effects of the library, if variants are given."""
+        return {cause_of(name) for name in self.given}
 
     def base(self) -> ScoredModel:
         """Return the model with the given effects only."""
@@ -298,6 +304,13 @@ class FittedModels:
             self.tried += 1
             self._known[request] = ScoredModel(names, fitted, cross_validated(fitted, self._fold, bounds), starts)
         return self._known[request]
+
+    def refitted(self, model: ScoredModel) -> ScoredModel | None:
+        """Return a model of other runs, or under other assumptions, fitted to these; None if the fit diverges."""
+        try:
+            return self.score(model.names, model.fit.parameters, None)
+        except np.linalg.LinAlgError:
+            return None
 
     def refitted_without(self, base: ScoredModel, current: ScoredModel, name: str) -> ScoredModel:
         """Return the model without the effect called `name`, refitted from `current` if that has the smaller deviance.

@@ -10,8 +10,6 @@ them result in. The measured one is noisy and late, the commanded one as wrong a
 
 from __future__ import annotations
 
-import numpy as np
-
 from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.predictor import Predictor
@@ -31,7 +29,7 @@ def choose_initial_steering(selector: AnySelector) -> AnySelector:
     if not has_initial_steering(selector):
         return selector
     base, other = selector.base(), under_other_initial_steering(selector)
-    if set(STEERING_DYNAMICS) & {cause_of(name) for name in selector.given}:
+    if set(STEERING_DYNAMICS) & selector.given_causes:
         return other if other.base().deviance < base.deviance - SELECTION.min_gain else selector
     return other if _is_better_beside(other, other.adopt(base), selector, base) else selector
 
@@ -49,10 +47,9 @@ def reconsider_initial_steering(selection: Selection, selector: AnySelector) -> 
     if not has_delay and chosen.names == selector.given:
         return selection, selector
     other = under_other_initial_steering(selector)
-    try:
-        there = other.score(chosen.names, chosen.fit.parameters, None)
-    except np.linalg.LinAlgError:
-        return selection, selector  # the fit diverged
+    there = other.refitted(chosen)
+    if there is None:
+        return selection, selector
     is_better = there.deviance < chosen.deviance - SELECTION.min_gain
     if is_better if has_delay else _is_better_beside(other, there, selector, chosen):
         return other.select(), other

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +32,8 @@ from agvbench.diagnosis.selection.with_term import TermSelection
 from agvbench.effects.variants import effect_variants
 from agvbench.types import Floats
 
+_EXACT_M2 = 1e-12
+"""A simulator without noise may be predicted exactly, and an error of zero has no logarithm."""
 _REJECTED = "{}: rejected in validation: the validation runs are predicted better without"
 
 
@@ -140,10 +143,6 @@ def without_effects(selection: Selection) -> Selection:
     return replace(selection, chosen=selection.base, alternatives={}, gains={}, rejected=rejected)
 
 
-_EXACT_M2 = 1e-12
-"""A simulator without noise may be predicted exactly, and an error of zero has no logarithm."""
-
-
 def predicts(chosen: ScoredModel, base: ScoredModel, kept: Readings) -> bool:
     """Return whether `chosen` predicts the runs `kept` no worse than `base`.
 
@@ -180,9 +179,9 @@ def predicts_left_out(chosen: ScoredModel, base: ScoredModel, selector: Selector
             Batch(batch.readings.select(runs), batch.maps, batch.geometry, kinds=batch.kinds)
             for runs in (fold != k, fold == k)
         )
-        refitted = selector.for_batch(others)
+        fitting = selector.for_batch(others)
         for i, model in enumerate((chosen, base)):
-            loss, square[i, fold == k] = _left_out(refitted, model, own)
+            loss, square[i, fold == k] = _in_batch(fitting.refitted(model), own)
             deviance[i] += loss
     if np.isinf(deviance).any():
         return bool(deviance[0] <= deviance[1])
@@ -213,24 +212,17 @@ def _difference(own: Floats, base: Floats) -> tuple[float, float]:
     return float(np.mean(worse)), float(chance)
 
 
-def _left_out(refitted: Selector, model: ScoredModel, own: Batch) -> tuple[float, Floats]:
-    """Return what `_in_batch` returns in the runs `own` of a model that is fitted to the others."""
-    try:
-        return _in_batch(refitted.score(model.names, model.fit.parameters, None), own)
-    except np.linalg.LinAlgError:
-        return math.inf, np.full(len(own.readings), math.inf)  # the fit diverged
-
-
-def _in_batch(model: ScoredModel, batch: Batch) -> tuple[float, Floats]:
+def _in_batch(model: ScoredModel | None, batch: Batch) -> tuple[float, Floats]:
     """Return a model's deviance in the runs of `batch`, and its mean squared position error in each (R,) [m²].
 
-    Both are infinite where the model cannot be evaluated.
+    Both are infinite where there is no model, because its fit diverged, and where it cannot be evaluated.
     """
-    predictor, own = Predictor(batch, model.fit.predictor.effects), model.fit
-    still = np.zeros((len(batch.readings), own.random_effects.shape[1]))
-    state = FitState(own.parameters, still, own.variance_components)
-    try:
-        loss = LevenbergMarquardt(predictor, np.empty((0, 2))).evaluate(state).terms.loss.sum()
-    except np.linalg.LinAlgError:
-        return math.inf, np.full(len(batch.readings), math.inf)
-    return float(loss), pose_residuals(batch.readings, predictor.predict(own.parameters)).squares()["position_rms_mm"]
+    if model is not None:
+        predictor, own = Predictor(batch, model.fit.predictor.effects), model.fit
+        still = np.zeros((len(batch.readings), own.random_effects.shape[1]))
+        state = FitState(own.parameters, still, own.variance_components)
+        with suppress(np.linalg.LinAlgError):
+            loss = LevenbergMarquardt(predictor, np.empty((0, 2))).evaluate(state).terms.loss.sum()
+            residuals = pose_residuals(batch.readings, predictor.predict(own.parameters))
+            return float(loss), residuals.squares()["position_rms_mm"]
+    return math.inf, np.full(len(batch.readings), math.inf)

@@ -169,11 +169,8 @@ def prefers_other_initial_steering(chosen: ScoredModel, selector: Selector) -> b
     poses = Predictor(there.batch, chosen.names).predict(fitted.parameters)
     if np.allclose(poses, fitted.predictor.predict(fitted.parameters), rtol=0.0, atol=_SAME_POSE, equal_nan=True):
         return False
-    try:
-        other = there.score(chosen.names, chosen.fit.parameters, None)
-    except np.linalg.LinAlgError:
-        return False  # the fit diverged
-    return other.deviance < chosen.deviance - SELECTION.min_gain
+    other = there.refitted(chosen)
+    return other is not None and other.deviance < chosen.deviance - SELECTION.min_gain
 
 
 def select_under_other_initial_steering(selector: Selector) -> tuple[Selection, Selector]:

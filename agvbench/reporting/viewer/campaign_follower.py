@@ -13,10 +13,11 @@ from agvbench.campaign.tables.parquet import read_parquet
 from agvbench.metrics.measured_run import MeasuredRun
 from agvbench.metrics.planned_paths import PlannedPaths
 from agvbench.running.configuration.provenance import Row
+from agvbench.running.configuration.settings import SETTINGS_FILE
 from agvbench.running.execution.event_log import EVENTS_TABLE
 
 _TABLES = ("runs", "commands", "poses")
-_BESIDE = (FILE_NAME, "bench.toml", "vehicle.toml", "inputs.parquet")
+_BESIDE = (FILE_NAME, SETTINGS_FILE, "vehicle.toml", "inputs.parquet")
 
 
 class CampaignFollower:

@@ -94,7 +94,7 @@ def compare(
     if other is None and pair is None:
         raise _alone(one)
     further = _further(metrics)
-    same_campaign = same_campaign or other is None or _are_same(one, other)
+    is_same = _are_same(one, other)
     errors_a = _errors(one, further, "a")
     compared = compare_errors(
         errors_a,
@@ -102,7 +102,7 @@ def compare(
         margin_mm=margin_mm,
         margin_deg=margin_deg,
         conditions=pair,
-        same_campaign=same_campaign,
+        same_campaign=same_campaign or other is None or is_same,
         deciding=deciding,
         further=further,
         names=names or _names(one, other, pair),
@@ -111,7 +111,7 @@ def compare(
         seed=seed,
     )
     _require_measured(compared, further)
-    is_itself = _are_same(one, other) and (pair is None or pair[0] == pair[1])
+    is_itself = is_same and (pair is None or pair[0] == pair[1])
     return _with_notes(compared, one, other, is_itself=is_itself, across_vehicles=across_vehicles)
 
 
@@ -122,9 +122,9 @@ def _are_same(a: Campaign | pd.DataFrame, b: Campaign | pd.DataFrame | None) -> 
 
 def _require_measured(compared: Comparison, further: Mapping[Quantity, float]) -> None:
     """Raise `InputError` if a metric that decides was measured nowhere on both sides."""
-    measured = {difference.quantity.name for difference in compared.differences}
+    measured = {difference.quantity for difference in compared.differences}
     for quantity in further:
-        if quantity.name not in measured:
+        if quantity not in measured:
             raise InputError(
                 "was not measured on both sides of any trajectory", where="--metrics", value=quantity.column,
                 remedy="leave it out, or see what a campaign has with agvbench report",

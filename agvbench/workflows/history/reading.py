@@ -117,14 +117,11 @@ def _chosen(nights: Nights, metrics: str | Collection[str] | None, conditions: s
             raise FlagError("no night has it", where=flag, value=unknown[0], limit=OneOf(known))
     kept = [k for k, kind in enumerate(nights.series) if all(kind[at] in names for at, names in wanted.items())]
     if not kept:
-        raise FlagError("no night has both", where="--metric, --condition", value=_shown(wanted))
+        metric, condition = (", ".join(sorted(wanted[at])) for at in (1, 0))
+        raise FlagError("no night has both", where="--metric, --condition", value=f"{metric} and {condition}")
     kept.sort(key=lambda k: (order_of.get(nights.series[k][1], len(order_of)), usual[nights.series[k][0]]))
     series = tuple(nights.series[k] for k in kept)
     return Nights(series, nights.trajectories, nights.repeats[kept], nights.median[kept], nights.spread[kept])
-
-
-def _shown(wanted: Mapping[int, Collection[str]]) -> str:
-    return " and ".join(", ".join(sorted(names)) for names in reversed(list(wanted.values())))
 
 
 def _campaigns(read: Sequence[ReadCampaign]) -> pd.DataFrame:
