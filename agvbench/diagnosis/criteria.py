@@ -249,6 +249,41 @@ class DriveLevelCriteria:
 
 
 @dataclass(frozen=True)
+class VaryingCriteria:
+    """How much the steering and the drive may differ between recordings of free driving, and how fast they drift.
+
+    ``offset_rad``, ``gain``
+        Typical difference between recordings: of an axle angle [rad] (of a differential vehicle: of the yaw rate,
+        rad/s), and of the logarithm of a gain.
+    ``share_within``
+        Typical variation within a recording, for seconds, as a share of that.
+    ``spread_between``, ``spread_within``
+        Standard deviations of the logarithms of both. Two or three recordings hardly tell how much recordings differ.
+    ``drift_s``, ``spread_drift``
+        Time in which a parameter typically drifts as far as recordings differ, and the standard deviation of its
+        logarithm.
+    ``within_s``
+        Time for which a variation within a recording lasts.
+    ``ahead_s``
+        A variation is predicted this far ahead, about the middle of a window.
+    ``time_error_s``, ``spread_time_error``
+        Typical error of the model in time, and the standard deviation of its logarithm.
+    """
+
+    offset_rad: float = 0.02
+    gain: float = 0.1
+    share_within: float = 0.3
+    spread_between: float = 0.5
+    spread_within: float = 1.5
+    drift_s: float = 120.0
+    spread_drift: float = 0.3
+    within_s: float = 3.0
+    ahead_s: float = 1.0
+    time_error_s: float = 0.1
+    spread_time_error: float = 0.7
+
+
+@dataclass(frozen=True)
 class SessionClockCriteria:
     """When the clocks of camera and vehicle differ by another offset in one session of free driving.
 
@@ -356,6 +391,7 @@ LOGGED = LoggedCriteria()
 DESIGN = DesignCriteria()
 PRIOR = PriorCriteria()
 FREE_DRIVING_LEVEL = DriveLevelCriteria()
+VARYING = VaryingCriteria()
 SESSION_CLOCK = SessionClockCriteria()
 
 

@@ -59,3 +59,33 @@ def test_a_mirrored_floor_of_such_a_vehicle_is_refused():
     mirrored = [replace(run, frames=replace(run.frames, y_m=-run.frames.y_m)) for run in campaign]
     with pytest.raises(CampaignError, match="heading_rad and the floor are mirrored"):
         require_plausible_units(mirrored, campaign.header)
+
+
+def squares(corner_rad, *, marker_m):
+    """Return runs of a vehicle that turns by `corner_rad` on the spot after each metre, which bends."""
+    rate, tracked_m, legs = 20.0, marker_m, 12
+    x = y = heading = 0.0
+    poses = []
+    for _ in range(legs):
+        for turn, metres, seconds in ((0.8, 1.0, 3.0), (corner_rad, 0.0, 1.5)):
+            steps = round(seconds * rate)
+            for _step in range(steps):
+                heading += turn / steps
+                x, y = x + np.cos(heading) * metres / steps, y + np.sin(heading) * metres / steps
+                poses.append((x + tracked_m * np.cos(heading), y + tracked_m * np.sin(heading), heading))
+    x, y, heading = np.array(poses).T
+    t_s, many = np.arange(len(x)) / rate, len(x)
+    nan, number = np.full(many, np.nan), np.full(many, -1)
+    frames = Frames(t_s, x, y, heading, np.ones(many, dtype=np.bool_), number, nan, nan)
+    return [replace(RUN, run_id=f"square {k}", frames=frames) for k in range(6)]
+
+
+# A right angle modulo half a turn is to the left as much as to the right.
+@pytest.mark.parametrize("marker_m", [0.0, -0.04, 0.1])
+@pytest.mark.parametrize("corner_rad", [np.pi / 2, -np.pi / 2, 1.7, 1.45])
+def test_corners_of_squares_are_no_mirrored_floor(corner_rad, marker_m):
+    runs, header = squares(corner_rad, marker_m=marker_m), replace(HEADER, mocap_rate_hz=20.0)
+    require_plausible_units(runs, header)
+    mirrored = [replace(run, frames=replace(run.frames, y_m=-run.frames.y_m)) for run in runs]
+    with pytest.raises(CampaignError, match="heading_rad"):
+        require_plausible_units(mirrored, header)

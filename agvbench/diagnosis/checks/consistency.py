@@ -19,6 +19,7 @@ _RATE_FACTOR = 30.0
 _MAX_UNORDERED = 0.25
 _FRAME_INTERVAL_S, _STRETCH = 0.3, 30
 _MIN_TURN_RAD, _MIN_STEPS, _MIN_TURNING = 0.15, 5, 5
+_MAX_BEND_RAD = 1.0
 _TURN_RATIO_LIMITS = (0.5, 2.0)
 _MIN_STEP_TO_NOISE = 10.0
 """A step so long has a direction known to 8°."""
@@ -109,9 +110,18 @@ def _turn_ratio(tracks: list[tuple[Floats, Floats, float]]) -> float | None:
         # Modulo half a turn: a reversing vehicle moves in the opposite direction along the same line.
         course = np.unwrap(np.arctan2(step[moves, 1], step[moves, 0]), period=np.pi)
         heading = (0.5 * (poses[1:, 2] + poses[:-1, 2]))[moves]
+        # Where it turned on the spot between two steps, a quarter of a turn to either side is the same.
+        corner = (np.diff(np.flatnonzero(moves)) > 1) | (np.abs(np.diff(course)) > _MAX_BEND_RAD)
+        arc = np.cumsum(np.r_[False, corner][: len(course)])
+        course, heading = (_centred(values, arc) for values in (course, heading))
         if len(course) >= _MIN_STEPS and np.std(course) > _MIN_TURN_RAD:
-            ratios.append(float(np.polyfit(course, heading, 1)[0]))
+            ratios.append(float(course @ heading / (course @ course)))
     return float(np.median(ratios)) if len(ratios) >= _MIN_TURNING else None
+
+
+def _centred(values: Floats, arc: NDArray[np.int64]) -> Floats:
+    """Return values (n,) beside the mean of their arc (n,)."""
+    return np.asarray(values - (np.bincount(arc, values) / np.maximum(np.bincount(arc), 1))[arc])
 
 
 _FAR_SHARE, _FAR_M = 0.3, 0.15

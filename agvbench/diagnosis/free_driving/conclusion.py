@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from agvbench.diagnosis.context import DiagnosisContext
 from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
+from agvbench.diagnosis.data.splits import Split
 from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
@@ -25,6 +26,8 @@ from agvbench.diagnosis.free_driving.drive_level import DriveLevel
 from agvbench.diagnosis.free_driving.errors import QUANTITIES, WindowErrors, repeatability_squares, rms, squares
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
 from agvbench.diagnosis.free_driving.selection import WindowSelector
+from agvbench.diagnosis.free_driving.varying_parameters import Variation, by_recording, varied_poses
+from agvbench.diagnosis.free_driving.window_residuals import VaryingModel, WindowResiduals
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.body_rates import residual_rates
@@ -41,19 +44,28 @@ from agvbench.types import Floats
 class WindowConclusion:
     """Assesses the selection on the test windows.
 
-    ``readings`` are all windows, ``assessment`` those that are predicted here, with the mask ``held`` of the test
-    windows. ``static`` are the maps without effects, fitted to the training windows. ``levels`` are those of the drive
-    by session.
+    ``readings`` are all windows, with their ``split``. Those ``assessed`` (indices) are predicted here. ``static`` are
+    the maps without effects, fitted to the training windows. ``levels`` are those of the drive by session.
     """
 
     context: DiagnosisContext
     readings: Readings
-    assessment: Readings
-    held: NDArray[np.bool_]
+    split: Split
+    assessed: NDArray[np.int64]
     static: Fit
     selector: WindowSelector
     selection: Selection
     levels: Mapping[str, DriveLevel]
+
+    @cached_property
+    def assessment(self) -> Readings:
+        """The windows that are predicted here."""
+        return self.readings.select(self.assessed)
+
+    @cached_property
+    def held(self) -> NDArray[np.bool_]:
+        """Which of these are test windows, (n,)."""
+        return self.split.test[self.assessed]
 
     def diagnosis(self, horizon: Horizon) -> Diagnosis:
         """Return the diagnosis."""
@@ -64,13 +76,14 @@ class WindowConclusion:
             "static": static.predict(self.static.parameters),
             "speed_held": speed_held(static.batch, self.static.parameters),
             "naive": constant_velocity(self.assessment),
+            "population": self._varying(chosen).predictor.predict(chosen.fit.parameters)[self.assessed],
             "after": poses,
         }
         before = predicted["static"]
         if context.vehicle is not None:
             before = predicted["believed"] = prior_model(context.vehicle, self.assessment, self.selector.batch.kinds)
         perturbed = change_by_speed_error(
-            Predictor(self._assessed, chosen.fit.predictor.effects), chosen.fit.parameters
+            Predictor(self._packed(self.assessment), chosen.fit.predictor.effects), chosen.fit.parameters
         )
         checks = check_priors(self.selection, self.selector.candidates)
         omitted = omitted_effects(chosen.fit)
@@ -112,6 +125,7 @@ class WindowConclusion:
                 "redundancy": batch.autocorrelation_time,
                 "initial_steering": "earlier commands" if batch.readings.preset else "measured yaw rate",
                 "sessions": self._sessions(),
+                "varying": self._varying_parameters(),
                 "commands": {role: of_channel.to_table() for role, of_channel in ranges.items()},
                 "recordings": errors.by_recording(self.held, beyond),
                 "effects": self._effect_errors(predicted["after"]),
@@ -129,14 +143,38 @@ class WindowConclusion:
             for name in dict.fromkeys([*offsets, *self.levels])
         }
 
+    def _varying_parameters(self) -> dict[str, object]:
+        """Return how much steering and drive vary, and what they were at the end of each recording."""
+        chosen, variation = self._varying(self.selection.chosen), self._variation
+        found = by_recording(chosen, variation, WindowResiduals.of(chosen))
+        return {
+            "between_recordings": dict(zip(chosen.names, variation.between.tolist(), strict=True)),
+            "within_recordings": dict(zip(chosen.names, variation.within.tolist(), strict=True)),
+            "drift_s": variation.drift_s,
+            "recordings": found,
+        }
+
     def _poses(self, model: ScoredModel) -> Floats:
-        """Return the poses that `model` predicts for every assessed window."""
-        return Predictor(self._assessed, model.fit.predictor.effects).predict(model.fit.parameters)
+        """Return the poses that `model` predicts for every assessed window, with what the windows before it say."""
+        varying = self._varying(model)
+        return varied_poses(varying, self._variation, WindowResiduals.of(varying))[self.assessed]
+
+    def _varying(self, model: ScoredModel) -> VaryingModel:
+        return VaryingModel.of(Predictor(self._every, model.fit.predictor.effects), model.fit.parameters)
 
     @cached_property
-    def _assessed(self) -> Batch:
+    def _variation(self) -> Variation:
+        """How much steering and drive vary beside the chosen model; with other models it is taken to be the same."""
+        chosen = self._varying(self.selection.chosen)
+        return Variation.fitted(chosen, WindowResiduals.of(chosen), self.split.training)
+
+    @cached_property
+    def _every(self) -> Batch:
+        return self._packed(self.readings)
+
+    def _packed(self, readings: Readings) -> Batch:
         batch = self.selector.batch
-        return Batch(self.assessment, batch.maps, self.context.geometry, batch.nodal_deviation, kinds=batch.kinds)
+        return Batch(readings, batch.maps, self.context.geometry, batch.nodal_deviation, kinds=batch.kinds)
 
     def _held_out(self, before: Floats, after: Floats, perturbed: Floats) -> HeldOut:
         kept = self.assessment.select(self.held)

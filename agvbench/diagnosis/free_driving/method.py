@@ -134,8 +134,8 @@ class FreeDriving(Method[SelectedFromWindows]):
         found = WindowConclusion(
             self.context,
             readings,
-            readings.select(assessed),
-            split.test[assessed],
+            split,
+            assessed,
             selected.static,
             selected.selector,
             selected.selection,
