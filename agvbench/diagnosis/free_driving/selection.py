@@ -10,7 +10,7 @@ import numpy as np
 from agvbench.diagnosis.criteria import FREE_DRIVING, SelectionCriteria
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.diagnosis.selection.actuators import CAMERA
+from agvbench.diagnosis.selection.actuators import CAMERA, SERVOS_DELAY
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selector
 from agvbench.types import Floats
@@ -24,10 +24,12 @@ class WindowSelector(Selector):
 
     ``test_batch`` holds the test windows, of which only commands and initial states are used. An effect extrapolates if
     its median change of the test windows is larger than its change of 98 % of the training windows. Such effects are
-    rejected; ``extrapolating`` names them.
+    rejected; ``extrapolating`` names them. A delay of each channel is the only variant that is tried: a simulation with
+    every variant takes three times as long.
     """
 
     criteria: ClassVar[SelectionCriteria] = FREE_DRIVING
+    further_kinds: ClassVar[frozenset[str] | None] = frozenset({SERVOS_DELAY})
     test_batch: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
 

@@ -24,7 +24,7 @@ CAMERA, DELAY = "mocap_latency", "actuation_delay"
 ACTUATORS = ("actuation_delay", "steering_lag", "speed_lag", "wheel_lag")
 SERVOS = ("actuation_delay", "steering_lag", "steering_rate_limit")
 MOTORS = (*SERVOS, "yaw_acceleration_limit", "speed_lag", "wheel_lag")
-_SERVOS_DELAY = "actuation_delay_servos"
+SERVOS_DELAY = "actuation_delay_servos"
 _EVEN, _UNEVEN = "steering_lag_inertia", "steering_lag_uneven"
 _LAG, _SPEED, _WHEELS = "steering_lag", "speed_lag", "wheel_lag"
 _SPEED_INERT, _WHEELS_INERT = "speed_lag_inertia", "wheel_lag_inertia"
@@ -104,7 +104,7 @@ def _with_channels(extended: Selector, chosen: ScoredModel, slow: list[str]) -> 
         max(values.get(name, 0.0), _LEAST_LAG_S) for name in ("time_constant_s", "accelerate_s", "brake_s")
     )
     kept = [value for key, value in own.items() if key.partition(".")[0] not in slow]
-    names = (*(name for name in chosen.names if name not in slow), _SERVOS_DELAY, _LAG, _SPEED)
+    names = (*(name for name in chosen.names if name not in slow), SERVOS_DELAY, _LAG, _SPEED)
     maps = chosen.fit.parameters[: extended.batch.maps.size]
     models = []
     for delay, time_constant in ((max(response - lag, 0.0), lag), (0.0, max(response, _LEAST_LAG_S))):

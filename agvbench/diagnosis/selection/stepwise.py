@@ -51,10 +51,12 @@ class Selection:
 class Selector(FittedModels):
     """Fits effects to the training runs, and selects those that meet the criterion.
 
-    ``extended`` is the selector of the same runs with the extended library, once it was needed.
+    ``extended`` is the selector of the same runs with the extended library, once it was needed. ``further_kinds`` names
+    what that library contains: by default every variant and term.
     """
 
     criteria: ClassVar[SelectionCriteria] = SELECTION
+    further_kinds: ClassVar[frozenset[str] | None] = None
     extended: Self | None = field(init=False, default=None)
 
     @property

@@ -56,10 +56,12 @@ def with_extended_library(selector: AnySelector) -> AnySelector:
 
     Every step of the selection gets the same one, so that no model is fitted twice.
     """
-    if {*EXTENDED_LIBRARY} <= {*selector.batch.kinds}:
+    names = selector.further_kinds
+    library = EXTENDED_LIBRARY if names is None else tuple(kind for kind in EXTENDED_LIBRARY if kind.name in names)
+    if {*library} <= {*selector.batch.kinds}:
         return selector
     if selector.extended is None:
-        selector.extended = selector.for_batch(selector.batch.repacked(kinds=EXTENDED_LIBRARY))
+        selector.extended = selector.for_batch(selector.batch.repacked(kinds=library))
     selector.extended.candidates = dict(selector.candidates)
     return selector.extended
 
