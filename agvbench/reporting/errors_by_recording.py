@@ -19,6 +19,7 @@ PREDICTORS = {
     "speed_held": "speed held",
     "naive": "constant velocity",
     "believed": "nominal",
+    "population": "as fitted",
     "after": "after",
 }
 """Titles of the predictors, by their names in the diagnosis' JSON."""
@@ -26,11 +27,12 @@ PREDICTORS = {
 PARTS = "within, beyond: (number of) windows with commands within and beyond the range of the training windows"
 """What the parts of a recording are."""
 
-_COLOURS = {"static": 0, "speed_held": 2, "naive": 3, "believed": 4, "after": 1}
+_COLOURS = {"static": 0, "speed_held": 2, "naive": 3, "believed": 4, "population": 5, "after": 1}
 _MOST_RECORDINGS, _MOST_DRAWN = 24, 16
 _CAPTION = (
     "Root mean square of the position error {ahead} ahead in the test windows, with 95 % intervals over sections of "
-    "the recording. A vertical line marks the error due to noise."
+    "the recording. A vertical line marks the error due to noise. As fitted, the model has one steering and one drive "
+    "for all recordings; after is with what each recording taught as it went on."
 )
 
 
