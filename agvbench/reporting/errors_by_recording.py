@@ -32,7 +32,7 @@ _MOST_RECORDINGS, _MOST_DRAWN = 24, 16
 _CAPTION = (
     "Root mean square of the position error {ahead} ahead in the test windows, with 95 % intervals over sections of "
     "the recording. A vertical line marks the error due to noise. As fitted, the model has one steering and one drive "
-    "for all recordings; after is with what each recording taught as it went on."
+    "for all recordings; after is with those estimated from earlier windows of each recording."
 )
 
 

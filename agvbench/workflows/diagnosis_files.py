@@ -181,7 +181,7 @@ def _varying_in_words(varying: Mapping[str, Any]) -> Iterator[str]:
             else:
                 told.append(f"{role} offset {value:.3f} ± {stderr:.3f} {'rad/s' if rest.endswith('radps') else 'rad'}")
         if told:
-            yield f"Recording {recording} at its end, learnt from it as it went on: {', '.join(told)}."
+            yield f"Recording {recording} at its end, estimated from its own windows: {', '.join(told)}."
 
 
 def extrapolation_in_words(content: Mapping[str, Any]) -> Iterator[str]:

@@ -4,7 +4,8 @@
 a mapping. They are imported and diagnosed as they are: whole days are the test. Printed for each vehicle: the error of
 position at the horizon on the test windows, of static maps in mm, and of the other predictors relative to it; the error
 due to noise; effects that were kept, and those of them that made this error larger. `population` is the model found
-without what a recording teaches as it goes on. A vehicle that is refused has the reason in place of figures.
+without what is estimated from earlier windows of a recording. A vehicle that is refused has the reason in place of
+figures.
 Run with ``python benchmarks/perf/perf_driven.py [--cars FIRST LAST] [--robots FIRST LAST] [--json FILE]``.
 """
 

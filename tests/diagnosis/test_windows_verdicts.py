@@ -107,7 +107,7 @@ def test_a_corrected_vehicle_with_another_law_is_diagnosed_again(lagging, tmp_pa
         vehicle=VehicleModel.load(tmp_path / "corrected.toml"),
     )
     assert not again.effects
-    # Both as they were fitted: what a recording teaches as it goes on is learnt beside the second only.
+    # Both as they were fitted: the second is without the estimates from each recording.
     for row in (row for row in again.provenance["windows"]["recordings"] if row["held_out"]):
         believed, refitted = (row["ahead_2_s"][f"{name}_mm"]["rms"] for name in ("believed", "population"))
         assert believed == pytest.approx(refitted, rel=0.2)

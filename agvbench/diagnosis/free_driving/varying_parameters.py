@@ -1,8 +1,8 @@
 """Parameters that differ between recordings and drift: steering offset and gain, and the level of the drive.
 
 A battery is charged, a linkage is knocked, another floor is driven on. The model of the selected effects has one value
-of each for all recordings. What a recording's own value is can be learnt from it only: from the residuals of the
-windows that ended before a prediction begins.
+of each for all recordings. A recording's own value is estimated from the residuals of the windows that ended before a
+prediction begins.
 """
 
 from __future__ import annotations
