@@ -16,6 +16,8 @@ from tiny_vehicle import Tiny
 
 from agvbench.diagnosis import diagnose
 from agvbench.diagnosis.free_driving.parameter_filter import filter_parameters
+from agvbench.diagnosis.free_driving.varying_parameters import _probability
+from agvbench.diagnosis.free_driving.window_residuals import WindowResiduals
 from agvbench.types import Commands, Run
 from agvbench.workflows.diagnosis_files import sessions_in_words
 
@@ -208,3 +210,27 @@ def test_a_vehicle_that_stays_the_same_is_predicted_as_well():
         value, stderr = at_end(found, name)
         assert abs(value) < 3.0 * stderr
     assert not list(sessions_in_words({"provenance": found.provenance}))
+
+
+def between(ends_s, begins_s, restarts):
+    none = np.zeros((len(begins_s), 0))
+    return WindowResiduals(np.arange(len(begins_s)), restarts, begins_s, ends_s, none, none, none, none)
+
+
+def test_windows_that_ended_decide_whether_a_recording_varies():
+    begins_s, restarts = np.arange(8.0), np.arange(8) == 0
+    evidence = np.array([1.0, 2.0, -0.5, 0.0, 4.0, -9.0, -9.0, 3.0])
+    told = _probability(between(begins_s + 1.0, begins_s, restarts), evidence)
+    odds = np.concatenate([[0.0], np.cumsum(evidence)[:-1]])
+    np.testing.assert_allclose(told, 1.0 / (1.0 + np.exp(-odds)))
+    late = _probability(between(begins_s + 2.5, begins_s, restarts), evidence)
+    np.testing.assert_allclose(late[3:], told[1:-2])
+    np.testing.assert_array_equal(late[:3], 0.5)
+
+
+def test_each_recording_decides_for_itself():
+    begins_s, restarts = np.tile(np.arange(4.0), 2), np.arange(8) % 4 == 0
+    told = _probability(between(begins_s + 1.0, begins_s, restarts), np.repeat([5.0, -5.0], 4))
+    assert told[0] == told[4] == 0.5
+    assert told[3] > 0.999
+    assert told[7] < 0.001

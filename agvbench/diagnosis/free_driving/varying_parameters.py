@@ -7,11 +7,14 @@ prediction begins.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from scipy.special import expit
 
 from agvbench.diagnosis.criteria import VARYING
 from agvbench.diagnosis.data.window_splits import _initial_states
@@ -29,7 +32,7 @@ class Variation:
     """How much the m ``quantities`` vary: standard deviations (m,) between recordings, and within one, for seconds.
 
     ``drift_s``: time in which they drift as far as recordings differ. ``lack`` (4,): what the model lacks besides, in
-    units of `WindowResiduals.scale`.
+    units of `WindowResiduals.scale`; ``lack_alone`` (4,): what it lacks if nothing varies.
     """
 
     quantities: tuple[Quantity, ...]
@@ -37,6 +40,7 @@ class Variation:
     within: Floats
     drift_s: float
     lack: Floats
+    lack_alone: Floats
 
     @classmethod
     def fitted(cls, model: VaryingModel, residuals: WindowResiduals, training: NDArray[np.bool_]) -> Variation:
@@ -46,45 +50,79 @@ class Variation:
         therefore the one of `VaryingCriteria`: log-normal, about what servos, floors and batteries differ by.
         """
         used = training[residuals.order] & np.isfinite(residuals.residual).all(axis=1)
-        offsets = np.array([not quantity.is_gain for quantity in model.quantities])
+        offsets, m = np.array([not quantity.is_gain for quantity in model.quantities]), len(model.quantities)
         between = np.where(offsets, VARYING.offset_rad, VARYING.gain)
-        usual = _usual_lack(residuals, used)
-        within, drift_s, time_error_s = VARYING.share_within * between, [VARYING.drift_s], [VARYING.time_error_s]
-        mean = np.log(np.concatenate([between, within, drift_s, usual, time_error_s]))
-        spread = np.repeat(
-            [VARYING.spread_between, VARYING.spread_within, VARYING.spread_drift, _WIDE, VARYING.spread_time_error],
-            [len(between), len(between), 1, len(usual), 1],
-        )
+        usual = np.append(_usual_lack(residuals, used), VARYING.time_error_s)
+        mean = np.log(np.concatenate([between, VARYING.share_within * between, [VARYING.drift_s], usual]))
+        of_lack = [_WIDE] * (_SCALES - 1) + [VARYING.spread_time_error]
+        spread = np.repeat([VARYING.spread_between, VARYING.spread_within, VARYING.spread_drift], [m, m, 1])
 
-        def loss(z: Floats) -> float:
-            density = cls._of(model.quantities, mean + spread * z)._filtered(residuals)[1]
-            return float(-np.sum(density[used]) + 0.5 * np.sum(z**2))
+        def with_variation(values: Floats) -> Floats:
+            return _filtered(residuals, values[:m], values[m : 2 * m], values[2 * m], values[2 * m + 1 :])[1][used]
 
-        found = minimize(loss, np.zeros(len(mean)), method="L-BFGS-B", bounds=[(-4.0, 4.0)] * len(mean))
-        return cls._of(model.quantities, mean + spread * found.x)
+        def alone(values: Floats) -> Floats:
+            return _filtered(residuals, np.zeros(m), np.zeros(m), VARYING.drift_s, values)[1][used]
 
-    @classmethod
-    def _of(cls, quantities: tuple[Quantity, ...], logarithms: Floats) -> Variation:
-        values, m = np.exp(logarithms), len(quantities)
-        return cls(quantities, values[:m], values[m : 2 * m], float(values[2 * m]), values[2 * m + 1 :])
+        found = _most_likely(with_variation, mean, np.append(spread, of_lack))
+        lack_alone = _most_likely(alone, mean[2 * m + 1 :], np.array(of_lack))
+        return cls(model.quantities, found[:m], found[m : 2 * m], found[2 * m], found[2 * m + 1 :], lack_alone)
 
     def estimates(self, residuals: WindowResiduals) -> tuple[Floats, Floats]:
-        """Return the quantities at the beginning of each window and their standard errors, both (W, m)."""
-        found = np.empty((len(residuals.order), 2, len(self.quantities)))
-        found[residuals.order] = self._filtered(residuals)[0]
-        return found[:, 0], found[:, 1]
+        """Return the quantities at the beginning of each window and their standard errors, both (W, m).
 
-    def _filtered(self, residuals: WindowResiduals) -> tuple[Floats, Floats]:
-        """Return estimates with their standard errors (W, 2, m) and log predictive densities (W,), in the order."""
-        count = len(residuals.order)
-        variance = residuals.noise + np.sum((self.lack[:, None] * residuals.scale) ** 2, axis=1) + _LEAST_VARIANCE
-        estimates, density = np.empty((count, 2, len(self.quantities))), np.empty(count)
-        filter_parameters(
-            residuals.restarts, residuals.begins_s, residuals.ends_s, residuals.residual, residuals.slopes, variance,
-            self.between**2, self.within**2, np.array([self.drift_s, VARYING.within_s]), VARYING.ahead_s,
-            estimates, density,
-        )  # fmt: skip
-        return estimates, density
+        They are means over two hypotheses: that the recording varies, and that it does not. Before the recording both
+        are equally probable; its windows decide (Bayesian model averaging).
+        """
+        values, density = _filtered(residuals, self.between, self.within, self.drift_s, self.lack)
+        none = np.zeros(len(self.quantities))
+        alone = _filtered(residuals, none, none, self.drift_s, self.lack_alone)[1]
+        share = _probability(residuals, density - alone)[:, None]
+        value, stderr = values[:, 0], values[:, 1]
+        found = np.empty((2, *value.shape))
+        found[:, residuals.order] = share * value, np.sqrt(share * stderr**2 + share * (1.0 - share) * value**2)
+        return found[0], found[1]
+
+
+def _most_likely(density: Callable[[Floats], Floats], mean: Floats, spread: Floats) -> Floats:
+    """Return the positive values (n,) of maximum posterior density.
+
+    Their logarithms have normal priors; `density` returns logarithms of likelihoods.
+    """
+
+    def loss(z: Floats) -> float:
+        return float(0.5 * np.sum(z**2) - np.sum(density(np.exp(mean + spread * z))))
+
+    found = minimize(loss, np.zeros(len(mean)), method="L-BFGS-B", bounds=[(-4.0, 4.0)] * len(mean))
+    return np.asarray(np.exp(mean + spread * found.x))
+
+
+def _filtered(
+    residuals: WindowResiduals, between: Floats, within: Floats, drift_s: float, lack: Floats
+) -> tuple[Floats, Floats]:
+    """Return estimates with their standard errors (W, 2, m) and log predictive densities (W,), in the order."""
+    count = len(residuals.order)
+    variance = residuals.noise + np.sum((lack[:, None] * residuals.scale) ** 2, axis=1) + _LEAST_VARIANCE
+    estimates, density = np.empty((count, 2, len(between))), np.empty(count)
+    filter_parameters(
+        residuals.restarts, residuals.begins_s, residuals.ends_s, residuals.residual, residuals.slopes, variance,
+        between**2, within**2, np.array([drift_s, VARYING.within_s]), VARYING.ahead_s, estimates, density,
+    )  # fmt: skip
+    return estimates, density
+
+
+def _probability(residuals: WindowResiduals, evidence: Floats) -> Floats:
+    """Return the probability of the first hypothesis at the beginning of each window (W,).
+
+    `evidence` (W,) is the logarithm of the ratio of both densities of each window. Windows that ended count.
+    """
+    probability = np.empty(len(evidence))
+    first = np.flatnonzero(residuals.restarts)
+    for begin, end in pairwise([*first.tolist(), len(evidence)]):
+        own = slice(begin, end)
+        ended = np.searchsorted(np.maximum.accumulate(residuals.ends_s[own]), residuals.begins_s[own], side="right")
+        total = np.concatenate([[0.0], np.cumsum(evidence[own])])[ended]
+        probability[own] = expit(total)
+    return probability
 
 
 def _usual_lack(residuals: WindowResiduals, used: NDArray[np.bool_]) -> Floats:
