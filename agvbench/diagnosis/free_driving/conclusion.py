@@ -76,9 +76,10 @@ class WindowConclusion:
             "static": static.predict(self.static.parameters),
             "speed_held": speed_held(static.batch, self.static.parameters),
             "naive": constant_velocity(self.assessment),
-            "population": self._varying(chosen).predictor.predict(chosen.fit.parameters)[self.assessed],
             "after": poses,
         }
+        if self._varies:
+            predicted["population"] = self._varying(chosen).predictor.predict(chosen.fit.parameters)[self.assessed]
         before = predicted["static"]
         if context.vehicle is not None:
             before = predicted["believed"] = prior_model(context.vehicle, self.assessment, self.selector.batch.kinds)
@@ -145,6 +146,8 @@ class WindowConclusion:
 
     def _varying_parameters(self) -> dict[str, object]:
         """Return how much steering and drive vary, and what they were at the end of each recording."""
+        if not self._varies:
+            return {}
         chosen, variation = self._varying(self.selection.chosen), self._variation
         found = by_recording(chosen, variation, WindowResiduals.of(chosen))
         return {
@@ -157,7 +160,17 @@ class WindowConclusion:
     def _poses(self, model: ScoredModel) -> Floats:
         """Return the poses that `model` predicts for every assessed window, with what the windows before it say."""
         varying = self._varying(model)
+        if not self._varies:
+            return varying.predictor.predict(model.fit.parameters)[self.assessed]
         return varied_poses(varying, self._variation, WindowResiduals.of(varying))[self.assessed]
+
+    @property
+    def _varies(self) -> bool:
+        """Whether steering and drive may vary between recordings; not of a differential vehicle.
+
+        What its controllers remember of long before is an error of the first windows, and was taken for a variation.
+        """
+        return not self.context.geometry.is_differential
 
     def _varying(self, model: ScoredModel) -> VaryingModel:
         return VaryingModel.of(Predictor(self._every, model.fit.predictor.effects), model.fit.parameters)
