@@ -12,6 +12,7 @@ from agvbench.diagnosis.criteria import (
     LOGGED,
     SELECTION,
     SESSION_CLOCK,
+    VARYING,
     stated_criteria,
 )
 from agvbench.diagnosis.data.readings import Readings
@@ -55,6 +56,8 @@ class DiagnosisContext:
         criteria = stated_criteria(FREE_DRIVING if windows else SELECTION, with_priors=bool(self.priors))
         if windows:
             criteria |= {"drive_level": asdict(FREE_DRIVING_LEVEL), "session_clock": asdict(SESSION_CLOCK)}
+        if windows and not self.geometry.is_differential:
+            criteria |= {"varying": asdict(VARYING)}
         logged: dict[str, object] = {}
         if stated := readings.logged.stated():
             criteria["logged"], logged = asdict(LOGGED), {"logged_columns": stated}

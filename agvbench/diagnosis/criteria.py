@@ -253,8 +253,7 @@ class VaryingCriteria:
     """How much the steering and the drive may differ between recordings of free driving, and how fast they drift.
 
     ``offset_rad``, ``gain``
-        Typical difference between recordings: of an axle angle [rad] (of a differential vehicle: of the yaw rate,
-        rad/s), and of the logarithm of a gain.
+        Typical difference between recordings: of an axle angle [rad], and of the logarithm of a gain.
     ``share_within``
         Typical variation within a recording, for seconds, as a share of that.
     ``spread_between``, ``spread_within``

@@ -163,25 +163,26 @@ def sessions_in_words(content: Mapping[str, Any]) -> Iterator[str]:
 
 
 _CLEARLY = 3.0
-_NOTICEABLE = {"gain": 0.03, "offset_rad": 0.005, "offset_radps": 0.01}
+_NOTICEABLE = {"gain": 0.03, "offset_rad": 0.005}
+_MOST_LOG_GAIN = 3.0
 
 
 def _varying_in_words(varying: Mapping[str, Any]) -> Iterator[str]:
     """Yield what steering and drive were at the end of a recording, where they clearly differ from the maps."""
     for recording, found in mapping(varying.get("recordings")).items():
-        told = []
+        differing = []
         for name, entry in mapping(found).items():
             value, stderr = (number(mapping(entry).get(key)) for key in ("value", "stderr"))
-            role, _, rest = name.partition("_")
-            if not abs(value) > max(_CLEARLY * stderr, _NOTICEABLE.get(rest, math.inf)):
+            role, _, kind = name.partition("_")
+            if not abs(value) > max(_CLEARLY * stderr, _NOTICEABLE.get(kind, math.inf)):
                 continue
-            if rest == "gain":
-                factor = math.exp(min(max(value, -_CLEARLY), _CLEARLY))
-                told.append(f"{role} gain {factor:.2f} ± {factor * stderr:.2f}")
+            if kind == "gain":
+                factor = math.exp(min(max(value, -_MOST_LOG_GAIN), _MOST_LOG_GAIN))
+                differing.append(f"{role} gain {factor:.2f} ± {factor * stderr:.2f}")
             else:
-                told.append(f"{role} offset {value:.3f} ± {stderr:.3f} {'rad/s' if rest.endswith('radps') else 'rad'}")
-        if told:
-            yield f"Recording {recording} at its end, estimated from its own windows: {', '.join(told)}."
+                differing.append(f"{role} offset {value:.3f} ± {stderr:.3f} rad")
+        if differing:
+            yield f"Recording {recording} at its end, estimated from its own windows: {', '.join(differing)}."
 
 
 def extrapolation_in_words(content: Mapping[str, Any]) -> Iterator[str]:

@@ -220,17 +220,17 @@ def between(ends_s, begins_s, restarts):
 def test_windows_that_ended_decide_whether_a_recording_varies():
     begins_s, restarts = np.arange(8.0), np.arange(8) == 0
     evidence = np.array([1.0, 2.0, -0.5, 0.0, 4.0, -9.0, -9.0, 3.0])
-    told = _probability(between(begins_s + 1.0, begins_s, restarts), evidence)
+    found = _probability(between(begins_s + 1.0, begins_s, restarts), evidence)
     odds = np.concatenate([[0.0], np.cumsum(evidence)[:-1]])
-    np.testing.assert_allclose(told, 1.0 / (1.0 + np.exp(-odds)))
+    np.testing.assert_allclose(found, 1.0 / (1.0 + np.exp(-odds)))
     late = _probability(between(begins_s + 2.5, begins_s, restarts), evidence)
-    np.testing.assert_allclose(late[3:], told[1:-2])
+    np.testing.assert_allclose(late[3:], found[1:-2])
     np.testing.assert_array_equal(late[:3], 0.5)
 
 
 def test_each_recording_decides_for_itself():
     begins_s, restarts = np.tile(np.arange(4.0), 2), np.arange(8) % 4 == 0
-    told = _probability(between(begins_s + 1.0, begins_s, restarts), np.repeat([5.0, -5.0], 4))
-    assert told[0] == told[4] == 0.5
-    assert told[3] > 0.999
-    assert told[7] < 0.001
+    found = _probability(between(begins_s + 1.0, begins_s, restarts), np.repeat([5.0, -5.0], 4))
+    assert found[0] == found[4] == 0.5
+    assert found[3] > 0.999
+    assert found[7] < 0.001

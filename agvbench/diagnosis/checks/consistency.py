@@ -121,7 +121,7 @@ def _turn_ratio(tracks: list[tuple[Floats, Floats, float]]) -> float | None:
 
 def _centred(values: Floats, arc: NDArray[np.int64]) -> Floats:
     """Return values (n,) beside the mean of their arc (n,)."""
-    return np.asarray(values - (np.bincount(arc, values) / np.maximum(np.bincount(arc), 1))[arc])
+    return np.asarray(values - (np.bincount(arc, values) / np.bincount(arc))[arc])
 
 
 _FAR_SHARE, _FAR_M = 0.3, 0.15

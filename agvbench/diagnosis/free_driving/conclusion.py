@@ -26,8 +26,8 @@ from agvbench.diagnosis.free_driving.drive_level import DriveLevel
 from agvbench.diagnosis.free_driving.errors import QUANTITIES, WindowErrors, repeatability_squares, rms, squares
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
 from agvbench.diagnosis.free_driving.selection import WindowSelector
-from agvbench.diagnosis.free_driving.varying_parameters import Variation, by_recording, varied_poses
-from agvbench.diagnosis.free_driving.window_residuals import VaryingModel, WindowResiduals
+from agvbench.diagnosis.free_driving.varying_parameters import Variation, at_end_of_recordings
+from agvbench.diagnosis.free_driving.window_residuals import VaryingModel
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.body_rates import residual_rates
@@ -79,13 +79,11 @@ class WindowConclusion:
             "after": poses,
         }
         if self._varies:
-            predicted["population"] = self._varying(chosen).predictor.predict(chosen.fit.parameters)[self.assessed]
+            predicted["population"] = self._chosen.predictor.predict(chosen.fit.parameters)[self.assessed]
         before = predicted["static"]
         if context.vehicle is not None:
             before = predicted["believed"] = prior_model(context.vehicle, self.assessment, self.selector.batch.kinds)
-        perturbed = change_by_speed_error(
-            Predictor(self._packed(self.assessment), chosen.fit.predictor.effects), chosen.fit.parameters
-        )
+        perturbed = change_by_speed_error(self._chosen.predictor, chosen.fit.parameters)[self.assessed]
         checks = check_priors(self.selection, self.selector.candidates)
         omitted = omitted_effects(chosen.fit)
         effects = with_evidence(named_effects(self.selection, bounds_of(chosen.names), omitted), checks)
@@ -148,21 +146,20 @@ class WindowConclusion:
         """Return how much steering and drive vary, and what they were at the end of each recording."""
         if not self._varies:
             return {}
-        chosen, variation = self._varying(self.selection.chosen), self._variation
-        found = by_recording(chosen, variation, WindowResiduals.of(chosen))
+        variation, names = self._variation, [quantity.name for quantity in self._chosen.quantities]
         return {
-            "between_recordings": dict(zip(chosen.names, variation.between.tolist(), strict=True)),
-            "within_recordings": dict(zip(chosen.names, variation.within.tolist(), strict=True)),
+            "between_recordings": dict(zip(names, variation.between.tolist(), strict=True)),
+            "within_recordings": dict(zip(names, variation.within.tolist(), strict=True)),
             "drift_s": variation.drift_s,
-            "recordings": found,
+            "recordings": at_end_of_recordings(self._chosen, variation),
         }
 
     def _poses(self, model: ScoredModel) -> Floats:
         """Return the poses that `model` predicts for every assessed window, with what the windows before it say."""
-        varying = self._varying(model)
+        varying = self._chosen if model is self.selection.chosen else self._varying(model)
         if not self._varies:
-            return varying.predictor.predict(model.fit.parameters)[self.assessed]
-        return varied_poses(varying, self._variation, WindowResiduals.of(varying))[self.assessed]
+            return varying.predictor.predict(varying.parameters)[self.assessed]
+        return varying.poses(self._variation.estimates(varying.residuals)[0])[self.assessed]
 
     @property
     def _varies(self) -> bool:
@@ -173,21 +170,21 @@ class WindowConclusion:
         return not self.context.geometry.is_differential
 
     def _varying(self, model: ScoredModel) -> VaryingModel:
-        return VaryingModel.of(Predictor(self._every, model.fit.predictor.effects), model.fit.parameters)
+        return VaryingModel(Predictor(self._every, model.fit.predictor.effects), model.fit.parameters)
+
+    @cached_property
+    def _chosen(self) -> VaryingModel:
+        return self._varying(self.selection.chosen)
 
     @cached_property
     def _variation(self) -> Variation:
         """How much steering and drive vary beside the chosen model; with other models it is taken to be the same."""
-        chosen = self._varying(self.selection.chosen)
-        return Variation.fitted(chosen, WindowResiduals.of(chosen), self.split.training)
+        return Variation.fitted(self._chosen, self.split.training)
 
     @cached_property
     def _every(self) -> Batch:
-        return self._packed(self.readings)
-
-    def _packed(self, readings: Readings) -> Batch:
         batch = self.selector.batch
-        return Batch(readings, batch.maps, self.context.geometry, batch.nodal_deviation, kinds=batch.kinds)
+        return Batch(self.readings, batch.maps, self.context.geometry, batch.nodal_deviation, kinds=batch.kinds)
 
     def _held_out(self, before: Floats, after: Floats, perturbed: Floats) -> HeldOut:
         kept = self.assessment.select(self.held)

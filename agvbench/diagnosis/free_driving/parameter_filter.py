@@ -13,6 +13,8 @@ from agvbench.types import Floats
 DEGREES_OF_FREEDOM = 4.0
 """Of Student's t distribution of residuals: few windows are far off, such as those in which a wheel spins."""
 
+_WITH_POSE = DEGREES_OF_FREEDOM + 3.0
+
 
 @compiled()
 def filter_parameters(
@@ -63,64 +65,88 @@ def filter_parameters(
     """
     count, m = slopes.shape[0], slopes.shape[2]
     state, covariance = np.zeros(2 * m), np.zeros((2 * m, 2 * m))
-    both = np.zeros((3, 2 * m))
-    degrees = DEGREES_OF_FREEDOM + 3.0
     pending, used_s = 0, -math.inf
     for i in range(count):
         if restarts[i]:
-            state[:] = 0.0
-            covariance[:] = 0.0
-            for k in range(m):
-                covariance[k, k], covariance[m + k, m + k] = slow[k], fast[k]
+            _begin(state, covariance, slow, fast)
             pending, used_s = i, -math.inf
         else:
             while pending < i and ends_s[pending] <= begins_s[i]:
-                j = pending
+                if begins_s[pending] >= used_s and not np.isnan(residual[pending, 0]):
+                    _update(state, covariance, residual[pending], slopes[pending], variance[pending])
+                    used_s = ends_s[pending]
                 pending += 1
-                if begins_s[j] < used_s or np.isnan(residual[j, 0]):
-                    continue
-                used_s = ends_s[j]
-                both[:, :m], both[:, m:] = slopes[j], slopes[j]
-                innovation = residual[j] - both @ state
-                known = both @ covariance @ both.T
-                squared = _squared_distance(innovation, known, variance[j], 1.0)
-                widened = max((DEGREES_OF_FREEDOM + squared) / degrees, 1.0)
-                inverse = np.linalg.inv(_total(known, variance[j], widened))
-                gain = covariance @ both.T @ inverse
-                state = state + gain @ innovation
-                covariance = covariance - gain @ (both @ covariance)
-            passed_s = max(begins_s[i] - begins_s[i - 1], 0.0)
-            kept = math.exp(-passed_s / times_s[1])
-            for k in range(m):
-                state[m + k] *= kept
-                covariance[m + k, :] *= kept
-                covariance[:, m + k] *= kept
-                covariance[k, k] += slow[k] * passed_s / times_s[0]
-                covariance[m + k, m + k] += fast[k] * (1.0 - kept * kept)
-        ahead = math.exp(-ahead_s / times_s[1])
-        for k in range(m):
-            estimates[i, 0, k] = state[k] + ahead * state[m + k]
-            own = covariance[k, k] + 2.0 * ahead * covariance[k, m + k] + ahead * ahead * covariance[m + k, m + k]
-            estimates[i, 1, k] = math.sqrt(max(own, 0.0))
+            _drift(state, covariance, slow, fast, times_s, max(begins_s[i] - begins_s[i - 1], 0.0))
+        _estimate(state, covariance, math.exp(-ahead_s / times_s[1]), estimates[i])
         density[i] = 0.0
         if not np.isnan(residual[i, 0]):
-            both[:, :m], both[:, m:] = slopes[i], slopes[i]
-            known = both @ covariance @ both.T
-            total = _total(known, variance[i], 1.0)
-            squared = _squared_distance(residual[i] - both @ state, known, variance[i], 1.0)
-            density[i] = -0.5 * (math.log(np.linalg.det(total)) + degrees * math.log1p(squared / DEGREES_OF_FREEDOM))
+            density[i] = _log_density(state, covariance, residual[i], slopes[i], variance[i])
 
 
 @compiled()
-def _total(known: Floats, variance: Floats, widened: float) -> Floats:
+def _begin(state: Floats, covariance: Floats, slow: Floats, fast: Floats) -> None:
+    """Set the state at the beginning of a recording: the slow parts (m,), then the fast ones."""
+    m = len(slow)
+    state[:] = 0.0
+    covariance[:] = 0.0
+    for k in range(m):
+        covariance[k, k], covariance[m + k, m + k] = slow[k], fast[k]
+
+
+@compiled()
+def _drift(state: Floats, covariance: Floats, slow: Floats, fast: Floats, times_s: Floats, passed_s: float) -> None:
+    """Let the slow parts walk, and the fast ones decay, for the time `passed_s`."""
+    m = len(slow)
+    kept = math.exp(-passed_s / times_s[1])
+    for k in range(m):
+        state[m + k] *= kept
+        covariance[m + k, :] *= kept
+        covariance[:, m + k] *= kept
+        covariance[k, k] += slow[k] * passed_s / times_s[0]
+        covariance[m + k, m + k] += fast[k] * (1.0 - kept * kept)
+
+
+@compiled()
+def _update(state: Floats, covariance: Floats, residual: Floats, slopes: Floats, variance: Floats) -> None:
+    """Update the state by the residual (3,) of a window."""
+    both = np.concatenate((slopes, slopes), axis=1)
+    innovation, known = residual - both @ state, both @ covariance @ both.T
+    widened = max((DEGREES_OF_FREEDOM + _squared_distance(innovation, known, variance)) / _WITH_POSE, 1.0)
+    gain = covariance @ both.T @ np.linalg.inv(_total(known, widened * variance))
+    state += gain @ innovation
+    covariance -= gain @ (both @ covariance)
+
+
+@compiled()
+def _estimate(state: Floats, covariance: Floats, ahead: float, estimate: Floats) -> None:
+    """Write parameters and standard errors into `estimate` (2, m), with the share `ahead` of the fast part."""
+    m = len(state) // 2
+    for k in range(m):
+        estimate[0, k] = state[k] + ahead * state[m + k]
+        own = covariance[k, k] + 2.0 * ahead * covariance[k, m + k] + ahead * ahead * covariance[m + k, m + k]
+        estimate[1, k] = math.sqrt(max(own, 0.0))
+
+
+@compiled()
+def _log_density(state: Floats, covariance: Floats, residual: Floats, slopes: Floats, variance: Floats) -> float:
+    """Return the logarithm of the predictive density of the residual (3,) of a window, but for a constant."""
+    both = np.concatenate((slopes, slopes), axis=1)
+    known = both @ covariance @ both.T
+    squared = _squared_distance(residual - both @ state, known, variance)
+    volume = math.log(np.linalg.det(_total(known, variance)))
+    return -0.5 * (volume + _WITH_POSE * math.log1p(squared / DEGREES_OF_FREEDOM))
+
+
+@compiled()
+def _total(known: Floats, variance: Floats) -> Floats:
     """Return the covariance (3, 3) of a residual: of the parameters, and of what else there is."""
     total = known.copy()
     for a in range(3):
-        total[a, a] += widened * variance[a]
+        total[a, a] += variance[a]
     return total
 
 
 @compiled()
-def _squared_distance(innovation: Floats, known: Floats, variance: Floats, widened: float) -> float:
+def _squared_distance(innovation: Floats, known: Floats, variance: Floats) -> float:
     """Return the squared Mahalanobis distance of an innovation (3,)."""
-    return float(innovation @ np.linalg.inv(_total(known, variance, widened)) @ innovation)
+    return float(innovation @ np.linalg.inv(_total(known, variance)) @ innovation)

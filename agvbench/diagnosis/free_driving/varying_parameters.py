@@ -19,7 +19,7 @@ from scipy.special import expit
 from agvbench.diagnosis.criteria import VARYING
 from agvbench.diagnosis.data.window_splits import _initial_states
 from agvbench.diagnosis.free_driving.parameter_filter import filter_parameters
-from agvbench.diagnosis.free_driving.window_residuals import Quantity, VaryingModel, WindowResiduals
+from agvbench.diagnosis.free_driving.window_residuals import VaryingModel, WindowResiduals
 from agvbench.types import Floats
 
 _SCALES = 4
@@ -29,13 +29,12 @@ _WIDE = 2.0
 
 @dataclass(frozen=True)
 class Variation:
-    """How much the m ``quantities`` vary: standard deviations (m,) between recordings, and within one, for seconds.
+    """How much m quantities vary: standard deviations (m,) between recordings, and within one, for seconds.
 
     ``drift_s``: time in which they drift as far as recordings differ. ``lack`` (4,): what the model lacks besides, in
     units of `WindowResiduals.scale`; ``lack_alone`` (4,): what it lacks if nothing varies.
     """
 
-    quantities: tuple[Quantity, ...]
     between: Floats
     within: Floats
     drift_s: float
@@ -43,12 +42,13 @@ class Variation:
     lack_alone: Floats
 
     @classmethod
-    def fitted(cls, model: VaryingModel, residuals: WindowResiduals, training: NDArray[np.bool_]) -> Variation:
+    def fitted(cls, model: VaryingModel, training: NDArray[np.bool_]) -> Variation:
         """Return the variation of maximum posterior density, given the residuals of the `training` windows (W,).
 
         Few recordings say little about how much recordings differ, and the maps absorb a part of that. The prior is
         therefore the one of `VaryingCriteria`: log-normal, about what servos, floors and batteries differ by.
         """
+        residuals = model.residuals
         used = training[residuals.order] & np.isfinite(residuals.residual).all(axis=1)
         offsets, m = np.array([not quantity.is_gain for quantity in model.quantities]), len(model.quantities)
         between = np.where(offsets, VARYING.offset_rad, VARYING.gain)
@@ -65,7 +65,7 @@ class Variation:
 
         found = _most_likely(with_variation, mean, np.append(spread, of_lack))
         lack_alone = _most_likely(alone, mean[2 * m + 1 :], np.array(of_lack))
-        return cls(model.quantities, found[:m], found[m : 2 * m], found[2 * m], found[2 * m + 1 :], lack_alone)
+        return cls(found[:m], found[m : 2 * m], found[2 * m], found[2 * m + 1 :], lack_alone)
 
     def estimates(self, residuals: WindowResiduals) -> tuple[Floats, Floats]:
         """Return the quantities at the beginning of each window and their standard errors, both (W, m).
@@ -74,13 +74,27 @@ class Variation:
         are equally probable; its windows decide (Bayesian model averaging).
         """
         values, density = _filtered(residuals, self.between, self.within, self.drift_s, self.lack)
-        none = np.zeros(len(self.quantities))
+        none = np.zeros(len(self.between))
         alone = _filtered(residuals, none, none, self.drift_s, self.lack_alone)[1]
         share = _probability(residuals, density - alone)[:, None]
         value, stderr = values[:, 0], values[:, 1]
         found = np.empty((2, *value.shape))
         found[:, residuals.order] = share * value, np.sqrt(share * stderr**2 + share * (1.0 - share) * value**2)
         return found[0], found[1]
+
+
+def at_end_of_recordings(model: VaryingModel, variation: Variation) -> dict[str, dict[str, dict[str, float]]]:
+    """Return for each recording the quantities and their standard errors at its last window."""
+    values, stderr = variation.estimates(model.residuals)
+    recording, order = _initial_states(model.predictor.readings).recording, model.residuals.order.tolist()
+    last = {str(recording[i]): i for i in order}
+    return {
+        name: {
+            quantity.name: {"value": float(values[i, k]), "stderr": float(stderr[i, k])}
+            for k, quantity in enumerate(model.quantities)
+        }
+        for name, i in last.items()
+    }
 
 
 def _most_likely(density: Callable[[Floats], Floats], mean: Floats, spread: Floats) -> Floats:
@@ -130,24 +144,3 @@ def _usual_lack(residuals: WindowResiduals, used: NDArray[np.bool_]) -> Floats:
     own = np.array([residuals.scale[used, a, a] for a in range(_SCALES - 1)]).T
     share = np.abs(residuals.residual[used]) / own
     return np.maximum(0.5 * np.median(share, axis=0) if len(share) else np.zeros(_SCALES - 1), _WIDE * 1e-4)
-
-
-def varied_poses(model: VaryingModel, variation: Variation, residuals: WindowResiduals) -> Floats:
-    """Return the poses (W, K, 3) that a model predicts with what earlier windows of each recording say."""
-    return model.poses(variation.estimates(residuals)[0])
-
-
-def by_recording(
-    model: VaryingModel, variation: Variation, residuals: WindowResiduals
-) -> dict[str, dict[str, dict[str, float]]]:
-    """Return for each recording the quantities and their standard errors at its last window."""
-    values, stderr = variation.estimates(residuals)
-    recording, order = _initial_states(model.predictor.readings).recording, residuals.order.tolist()
-    last = {str(recording[i]): i for i in order}
-    return {
-        name: {
-            quantity: {"value": float(values[i, k]), "stderr": float(stderr[i, k])}
-            for k, quantity in enumerate(model.names)
-        }
-        for name, i in last.items()
-    }

@@ -6,19 +6,19 @@ Residuals are those at half the horizon, in axes of the predicted pose there. Th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.window_splits import _initial_states
-from agvbench.diagnosis.data.windows import SAMPLES
-from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.free_driving.errors import REPORTED_SAMPLES
 from agvbench.diagnosis.model.nodal_maps import ROLES
-from agvbench.diagnosis.model.predictor import MAX_ANGLE_RAD, MAX_YAW_RATE, Predictor
+from agvbench.diagnosis.model.predictor import MAX_ANGLE_RAD, Predictor
 from agvbench.types import Floats
 
-_SAMPLE = SAMPLES // 2 - 1
+_SAMPLE = REPORTED_SAMPLES[0]
 _STEP = 1e-3
 _LEAST_M = 0.02
 _UNCERTAIN_S = 1.0
@@ -31,55 +31,47 @@ class Quantity:
     role: str
     is_gain: bool
 
-    def name(self, *, is_differential: bool) -> str:
-        """Return the name with its unit, such as ``front_offset_rad``."""
-        if self.is_gain:
-            return f"{self.role}_gain"
-        return f"{self.role}_offset_{'radps' if is_differential else 'rad'}"
-
-
-def varying_quantities(batch: Batch) -> tuple[Quantity, ...]:
-    """Return what may vary of a vehicle: offset and gain of each channel that steers, and the gain of the drive.
-
-    A channel with one command in all windows does not steer.
-    """
-    steered = [role for role in ROLES if role != "drive" and len(batch.maps.nodes[role]) > 1]
-    return (*(Quantity(role, is_gain) for role in steered for is_gain in (False, True)), Quantity("drive", True))
+    @property
+    def name(self) -> str:
+        """The name with its unit, such as ``front_offset_rad``."""
+        return f"{self.role}_gain" if self.is_gain else f"{self.role}_offset_rad"
 
 
 @dataclass(frozen=True)
 class VaryingModel:
-    """A fitted model whose ``quantities`` have other values in each window."""
+    """A fitted model of a vehicle with steered axles, whose ``quantities`` have other values in each window."""
 
     predictor: Predictor
     parameters: Floats
-    quantities: tuple[Quantity, ...]
 
-    @classmethod
-    def of(cls, predictor: Predictor, parameters: Floats) -> VaryingModel:
-        """Return the model with all that may vary of its vehicle."""
-        return cls(predictor, parameters, varying_quantities(predictor.batch))
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What may vary: offset and gain of each channel that steers, and the gain of the drive.
 
-    @property
-    def names(self) -> list[str]:
-        """The names of the quantities, with their units."""
-        is_differential = self.predictor.batch.geometry.is_differential
-        return [quantity.name(is_differential=is_differential) for quantity in self.quantities]
+        A channel with one command in all windows does not steer.
+        """
+        nodes = self.predictor.maps.nodes
+        steered = [role for role in ROLES if role != "drive" and len(nodes[role]) > 1]
+        return (*(Quantity(role, is_gain) for role in steered for is_gain in (False, True)), Quantity("drive", True))
+
+    @cached_property
+    def residuals(self) -> WindowResiduals:
+        """The residuals of all windows, with none of the quantities changed."""
+        return WindowResiduals.of(self)
 
     def poses(self, values: Floats) -> Floats:
         """Return the predicted poses (W, K, 3) for the quantities' `values` (W, m)."""
         batch = self.predictor.batch
         settled, initial = self.predictor.settled(self.parameters)
         of_row = values[batch.base.row_runs]
-        most = MAX_YAW_RATE if batch.geometry.is_differential else MAX_ANGLE_RAD
         for k, quantity in enumerate(self.quantities):
             column = ROLES.index(quantity.role)
             if quantity.is_gain:
                 settled[:, column] *= np.exp(of_row[:, k])
             else:
-                settled[:, column] += np.where(batch.acting[quantity.role], of_row[:, k], 0.0)
+                settled[:, column] += of_row[:, k]
             if quantity.role != "drive":
-                settled[:, column] = np.clip(settled[:, column], -most, most)
+                settled[:, column] = np.clip(settled[:, column], -MAX_ANGLE_RAD, MAX_ANGLE_RAD)
         parameters, deviation = self.predictor.all_parameters(self.parameters), batch.nodal_deviation
         poses = batch.base.predict(settled, parameters, initial, nodal_deviation=deviation)
         return poses.reshape(len(values), -1, 3)
