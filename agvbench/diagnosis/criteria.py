@@ -252,8 +252,9 @@ class DriveLevelCriteria:
 class VaryingCriteria:
     """How much the steering and the drive may differ between recordings of free driving, and how fast they drift.
 
-    ``offset_rad``, ``gain``
-        Typical difference between recordings: of an axle angle [rad], and of the logarithm of a gain.
+    ``offset_rad``, ``offset_per_m``, ``gain``
+        Typical difference between recordings: of an axle angle [rad], of the curvature of a differential vehicle's
+        path [1/m], and of the logarithm of a gain.
     ``share_within``
         Typical variation within a recording, for seconds, as a share of that.
     ``spread_between``, ``spread_within``
@@ -267,9 +268,16 @@ class VaryingCriteria:
         A variation is predicted this far ahead, about the middle of a window.
     ``time_error_s``, ``spread_time_error``
         Typical error of the model in time, and the standard deviation of its logarithm.
+    ``at_beginning``, ``spread_at_beginning``
+        Typical error of the model at the beginning of a run, as a share of the distance, because what was commanded
+        before is not known, and the standard deviation of its logarithm.
+    ``least_map_change``, ``max_map_components``
+        Components of the uncertainty of the maps with a standard deviation of this share of a map's largest value are
+        estimated, and at most this many.
     """
 
     offset_rad: float = 0.02
+    offset_per_m: float = 0.02
     gain: float = 0.1
     share_within: float = 0.3
     spread_between: float = 0.5
@@ -280,6 +288,10 @@ class VaryingCriteria:
     ahead_s: float = 1.0
     time_error_s: float = 0.1
     spread_time_error: float = 0.7
+    at_beginning: float = 0.05
+    spread_at_beginning: float = 1.5
+    least_map_change: float = 0.01
+    max_map_components: int = 16
 
 
 @dataclass(frozen=True)

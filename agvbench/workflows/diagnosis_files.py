@@ -163,7 +163,8 @@ def sessions_in_words(content: Mapping[str, Any]) -> Iterator[str]:
 
 
 _CLEARLY = 3.0
-_NOTICEABLE = {"gain": 0.03, "offset_rad": 0.005}
+_NOTICEABLE = {"gain": 0.03, "offset_rad": 0.005, "offset_per_m": 0.005}
+_UNITS = {"offset_rad": "rad", "offset_per_m": "1/m"}
 _MOST_LOG_GAIN = 3.0
 
 
@@ -180,7 +181,7 @@ def _varying_in_words(varying: Mapping[str, Any]) -> Iterator[str]:
                 factor = math.exp(min(max(value, -_MOST_LOG_GAIN), _MOST_LOG_GAIN))
                 differing.append(f"{role} gain {factor:.2f} ± {factor * stderr:.2f}")
             else:
-                differing.append(f"{role} offset {value:.3f} ± {stderr:.3f} rad")
+                differing.append(f"{role} offset {value:.3f} ± {stderr:.3f} {_UNITS[kind]}")
         if differing:
             yield f"Recording {recording} at its end, estimated from its own windows: {', '.join(differing)}."
 

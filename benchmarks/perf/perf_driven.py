@@ -43,8 +43,7 @@ def judged(found: Diagnosis) -> dict[str, Any]:
     count = [row["windows"] for row in rows]
 
     def error(name: str) -> float:
-        known = f"{name}_mm" if f"{name}_mm" in ahead[0] else "after_mm"  # of robots nothing varies
-        return math.sqrt(np.average([one[known]["rms"] ** 2 for one in ahead], weights=count))
+        return math.sqrt(np.average([one[f"{name}_mm"]["rms"] ** 2 for one in ahead], weights=count))
 
     kept = {name: entry["held_out_position_mm"] for name, entry in windows["effects"].items() if entry["kept"]}
     worse = [name for name, errors in kept.items() if errors["with"] > errors["without"]]

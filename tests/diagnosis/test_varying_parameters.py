@@ -6,19 +6,24 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from free_drives import FREE_HEADER, free_runs, joystick
 from hypothesis import given
 from hypothesis import strategies as st
-from tiny_vehicle import Tiny
+from tiny_vehicle import NEUTRAL, Tiny
 
 from agvbench.diagnosis import diagnose
 from agvbench.diagnosis.free_driving.parameter_filter import filter_parameters
+from agvbench.diagnosis.free_driving.varying_model import VaryingModel
 from agvbench.diagnosis.free_driving.varying_parameters import _probability
 from agvbench.diagnosis.free_driving.window_residuals import WindowResiduals
-from agvbench.types import Commands, Run
+from agvbench.diagnosis.model.nodal_maps import NodalMaps
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.types import Command, Commands, Run
 from agvbench.workflows.diagnosis_files import sessions_in_words
 
 DRIFT_S, WITHIN_S = 50.0, 3.0
@@ -49,10 +54,10 @@ def covariance(first_s, second_s, begun_s, slow, fast):
     return walked + fast * np.exp(-abs(first_s - second_s) / WITHIN_S)
 
 
-@given(st.integers(0, 10_000))
-def test_estimates_are_those_of_a_regression_with_the_same_prior(seed):
+@given(st.integers(0, 10_000), st.sampled_from([[0.01, 0.03], [0.01], []]))
+def test_estimates_are_those_of_a_regression_with_the_same_prior(seed, of_fast):
     begins_s, ends_s, residual, slopes, variance = drawn(seed)
-    slow, fast = np.array([0.04, 0.02]), np.array([0.01, 0.03])
+    slow, fast = np.array([0.04, 0.02]), np.array(of_fast)
     estimates, _ = filtered(begins_s, ends_s, residual, slopes, variance, slow=slow, fast=fast)
     k, m = len(begins_s) - 1, 2
     times = [*begins_s[:k], begins_s[k]]
@@ -60,7 +65,8 @@ def test_estimates_are_those_of_a_regression_with_the_same_prior(seed):
     for a, first in enumerate(times):
         for b, second in enumerate(times):
             for q in range(m):
-                prior[m * a + q, m * b + q] = covariance(first, second, begins_s[0], slow[q], fast[q])
+                of_second = fast[q] if q < len(fast) else 0.0
+                prior[m * a + q, m * b + q] = covariance(first, second, begins_s[0], slow[q], of_second)
     design = np.zeros((3 * k, m * (k + 1)))
     for a in range(k):
         design[3 * a : 3 * a + 3, m * a : m * a + m] = slopes[a]
@@ -140,18 +146,26 @@ class Recordings:
     """Free driving of one vehicle, three recordings in the morning, and one in the evening, which is the test.
 
     In it the vehicle is steered beside what is recorded, by `steering_us`, and drives `faster`. If the drive is
-    `held`, each recording has one drive command, which no other one has.
+    `held`, each recording has one drive command, which no other one has. In the morning the axles are steered by the
+    share `reach` of what they are in the evening. The front axle has an end stop, `limit_us` from neutral.
     """
 
     header = FREE_HEADER
 
-    def __init__(self, *, steering_us: float = 0.0, faster: float = 1.0, held: bool = False) -> None:
+    def __init__(
+        self,
+        *,
+        steering_us: float = 0.0,
+        faster: float = 1.0,
+        held: bool = False,
+        reach: float = 1.0,
+        limit_us: float = np.inf,
+    ) -> None:
         self._held = itertools.cycle([1100.0, 1150.0, 1200.0, 1125.0] if held else [None])
+        self._reach = itertools.cycle([reach, reach, reach, 1.0])
         recorded, driven = (
-            free_runs(
-                Tiny(steering_lag_s=0.15, speed_factor=factor), runs=1, seconds=60.0, by=partial(self._by, offset_us)
-            )
-            for offset_us, factor in ((0.0, 1.0), (steering_us, faster))
+            free_runs(Tiny(steering_lag_s=0.15, speed_factor=factor), runs=1, seconds=60.0, by=partial(self._by, *by))
+            for *by, factor in ((0.0, np.inf, 1.0), (steering_us, limit_us, faster))
         )
         splits = ("fit", "fit", "fit", "held_out")
         test = replace(driven[3], commands=recorded[3].commands)
@@ -160,10 +174,11 @@ class Recordings:
             for k, run in enumerate([*recorded[:3], test])
         ]
 
-    def _by(self, steering_us: float, seconds: float, rng: np.random.Generator) -> Commands:
-        commands, held = joystick(seconds, rng), next(self._held)
+    def _by(self, steering_us: float, limit_us: float, seconds: float, rng: np.random.Generator) -> Commands:
+        commands, held = joystick(seconds, rng, next(self._reach)), next(self._held)
         drive = commands.drive if held is None else np.full_like(commands.drive, held)
-        return replace(commands, front=commands.front + steering_us, drive=drive)
+        front = np.clip(commands.front + steering_us, NEUTRAL - limit_us, NEUTRAL + limit_us)
+        return replace(commands, front=front, drive=drive)
 
     def __iter__(self) -> Iterator[Run]:
         return iter(self.runs)
@@ -198,6 +213,27 @@ def test_a_drive_that_runs_faster_at_a_command_of_its_own_is_followed():
     value, stderr = at_end(found, "drive_gain")
     assert value > 3.0 * stderr
     assert value == pytest.approx(np.log(1.1), abs=0.04)
+
+
+def test_a_map_beyond_the_training_commands_is_followed():
+    found = diagnose(Recordings(reach=0.5, limit_us=200.0))
+    errors = held_out(found)
+    assert errors["after"] < 0.3 * errors["population"]
+    assert found.provenance["windows"]["varying"]["map_components"] > 0
+
+
+@given(st.integers(0, 10_000))
+def test_components_of_the_maps_are_their_covariance(seed):
+    rng = np.random.default_rng(seed)
+    maps = NodalMaps(
+        {"front": np.array([-1.0, 0.0, 1.0]), "rear": np.zeros(1), "drive": np.array([1.0, 2.0])},
+        Command(0.0, 0.0, 0.0),
+    )
+    values, spread = rng.uniform(0.2, 1.0, maps.size), rng.normal(size=(maps.size, maps.size))
+    predictor = cast(Predictor, SimpleNamespace(maps=maps))
+    model = VaryingModel(predictor, values, spread @ spread.T)
+    np.testing.assert_allclose(model.map_components.T @ model.map_components, spread @ spread.T, rtol=0.05, atol=0.05)
+    assert not len(VaryingModel(predictor, values, 1e-8 * spread @ spread.T).map_components)
 
 
 def test_a_vehicle_that_stays_the_same_is_predicted_as_well():

@@ -26,8 +26,9 @@ from agvbench.diagnosis.free_driving.drive_level import DriveLevel
 from agvbench.diagnosis.free_driving.errors import QUANTITIES, WindowErrors, repeatability_squares, rms, squares
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
 from agvbench.diagnosis.free_driving.selection import WindowSelector
+from agvbench.diagnosis.free_driving.varying_model import VaryingModel
 from agvbench.diagnosis.free_driving.varying_parameters import Variation, at_end_of_recordings
-from agvbench.diagnosis.free_driving.window_residuals import VaryingModel
+from agvbench.diagnosis.free_driving.window_residuals import WindowResiduals
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.residuals.body_rates import residual_rates
@@ -76,10 +77,9 @@ class WindowConclusion:
             "static": static.predict(self.static.parameters),
             "speed_held": speed_held(static.batch, self.static.parameters),
             "naive": constant_velocity(self.assessment),
+            "population": self._chosen.predictor.predict(chosen.fit.parameters)[self.assessed],
             "after": poses,
         }
-        if self._varies:
-            predicted["population"] = self._chosen.predictor.predict(chosen.fit.parameters)[self.assessed]
         before = predicted["static"]
         if context.vehicle is not None:
             before = predicted["believed"] = prior_model(context.vehicle, self.assessment, self.selector.batch.kinds)
@@ -144,42 +144,39 @@ class WindowConclusion:
 
     def _varying_parameters(self) -> dict[str, object]:
         """Return how much steering and drive vary, and what they were at the end of each recording."""
-        if not self._varies:
-            return {}
         variation, names = self._variation, [quantity.name for quantity in self._chosen.quantities]
         return {
             "between_recordings": dict(zip(names, variation.between.tolist(), strict=True)),
             "within_recordings": dict(zip(names, variation.within.tolist(), strict=True)),
             "drift_s": variation.drift_s,
-            "recordings": at_end_of_recordings(self._chosen, variation),
+            "map_components": len(self._chosen.map_components),
+            "recordings": at_end_of_recordings(self._chosen, self._residuals, variation),
         }
 
     def _poses(self, model: ScoredModel) -> Floats:
         """Return the poses that `model` predicts for every assessed window, with what the windows before it say."""
-        varying = self._chosen if model is self.selection.chosen else self._varying(model)
-        if not self._varies:
-            return varying.predictor.predict(varying.parameters)[self.assessed]
-        return varying.poses(self._variation.estimates(varying.residuals)[0])[self.assessed]
-
-    @property
-    def _varies(self) -> bool:
-        """Whether steering and drive may vary between recordings; not of a differential vehicle.
-
-        What its controllers remember of long before is an error of the first windows, and was taken for a variation.
-        """
-        return not self.context.geometry.is_differential
+        is_chosen = model is self.selection.chosen
+        varying = self._chosen if is_chosen else self._varying(model)
+        residuals = self._residuals if is_chosen else WindowResiduals.of(varying)
+        return varying.poses(self._variation.estimates(residuals)[0])[self.assessed]
 
     def _varying(self, model: ScoredModel) -> VaryingModel:
-        return VaryingModel(Predictor(self._every, model.fit.predictor.effects), model.fit.parameters)
+        fitted = model.fit
+        predictor, nodal = Predictor(self._every, fitted.predictor.effects), slice(fitted.predictor.maps.size)
+        return VaryingModel(predictor, fitted.parameters, fitted.covariance[nodal, nodal])
 
     @cached_property
     def _chosen(self) -> VaryingModel:
         return self._varying(self.selection.chosen)
 
     @cached_property
+    def _residuals(self) -> WindowResiduals:
+        return WindowResiduals.of(self._chosen)
+
+    @cached_property
     def _variation(self) -> Variation:
         """How much steering and drive vary beside the chosen model; with other models it is taken to be the same."""
-        return Variation.fitted(self._chosen, self.split.training)
+        return Variation.fitted(self._chosen, self._residuals, self.split.training)
 
     @cached_property
     def _every(self) -> Batch:

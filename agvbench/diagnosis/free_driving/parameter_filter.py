@@ -33,8 +33,9 @@ def filter_parameters(
 ) -> None:
     """Estimate the parameters at the beginning of each window from the windows that ended before it.
 
-    Each parameter is the sum of a random walk and of a first-order autoregressive process (Ornstein–Uhlenbeck), both
-    zero in the mean (Durbin and Koopman 2012, Time series analysis by state space methods, chapters 3 and 4). A
+    Each parameter is a random walk, and the first ones are the sum of one and of a first-order autoregressive process
+    (Ornstein–Uhlenbeck), all zero in the mean (Durbin and Koopman 2012, Time series analysis by state space methods,
+    chapters 3 and 4). A
     residual far from its prediction counts less, by the weight of Student's t distribution. Windows that overlap one
     that was used are left out, because their residuals are correlated.
 
@@ -52,7 +53,7 @@ def filter_parameters(
     variance
         (W, 3): variance of the residual for other reasons than the parameters.
     slow, fast
-        (m,): variance of the slow part between recordings, and of the fast part.
+        (m,): variance of the slow part between recordings; (f,): variance of the fast part of the first f parameters.
     times_s
         (2,): time in which the slow part drifts by its standard deviation between recordings, and time constant of the
         fast part.
@@ -63,8 +64,8 @@ def filter_parameters(
     density
         (W,): receives the logarithm of the predictive density of each residual, zero if there is none.
     """
-    count, m = slopes.shape[0], slopes.shape[2]
-    state, covariance = np.zeros(2 * m), np.zeros((2 * m, 2 * m))
+    count, states = slopes.shape[0], len(slow) + len(fast)
+    state, covariance = np.zeros(states), np.zeros((states, states))
     pending, used_s = 0, -math.inf
     for i in range(count):
         if restarts[i]:
@@ -73,24 +74,31 @@ def filter_parameters(
         else:
             while pending < i and ends_s[pending] <= begins_s[i]:
                 if begins_s[pending] >= used_s and not np.isnan(residual[pending, 0]):
-                    _update(state, covariance, residual[pending], slopes[pending], variance[pending])
+                    _update(state, covariance, residual[pending], _by_state(slopes[pending], fast), variance[pending])
                     used_s = ends_s[pending]
                 pending += 1
             _drift(state, covariance, slow, fast, times_s, max(begins_s[i] - begins_s[i - 1], 0.0))
-        _estimate(state, covariance, math.exp(-ahead_s / times_s[1]), estimates[i])
+        _estimate(state, covariance, math.exp(-ahead_s / times_s[1]), len(fast), estimates[i])
         density[i] = 0.0
         if not np.isnan(residual[i, 0]):
-            density[i] = _log_density(state, covariance, residual[i], slopes[i], variance[i])
+            density[i] = _log_density(state, covariance, residual[i], _by_state(slopes[i], fast), variance[i])
 
 
 @compiled()
 def _begin(state: Floats, covariance: Floats, slow: Floats, fast: Floats) -> None:
-    """Set the state at the beginning of a recording: the slow parts (m,), then the fast ones."""
-    m = len(slow)
+    """Set the state at the beginning of a recording: the slow parts (m,), then the fast ones (f,)."""
     state[:] = 0.0
     covariance[:] = 0.0
-    for k in range(m):
-        covariance[k, k], covariance[m + k, m + k] = slow[k], fast[k]
+    for k in range(len(slow)):
+        covariance[k, k] = slow[k]
+    for k in range(len(fast)):
+        covariance[len(slow) + k, len(slow) + k] = fast[k]
+
+
+@compiled()
+def _by_state(slopes: Floats, fast: Floats) -> Floats:
+    """Return the derivatives (3, m + f) by the state, from those by the parameters (3, m)."""
+    return np.concatenate((slopes, slopes[:, : len(fast)]), axis=1)
 
 
 @compiled()
@@ -99,40 +107,41 @@ def _drift(state: Floats, covariance: Floats, slow: Floats, fast: Floats, times_
     m = len(slow)
     kept = math.exp(-passed_s / times_s[1])
     for k in range(m):
+        covariance[k, k] += slow[k] * passed_s / times_s[0]
+    for k in range(len(fast)):
         state[m + k] *= kept
         covariance[m + k, :] *= kept
         covariance[:, m + k] *= kept
-        covariance[k, k] += slow[k] * passed_s / times_s[0]
         covariance[m + k, m + k] += fast[k] * (1.0 - kept * kept)
 
 
 @compiled()
 def _update(state: Floats, covariance: Floats, residual: Floats, slopes: Floats, variance: Floats) -> None:
-    """Update the state by the residual (3,) of a window."""
-    both = np.concatenate((slopes, slopes), axis=1)
-    innovation, known = residual - both @ state, both @ covariance @ both.T
+    """Update the state by the residual (3,) of a window, with its `slopes` by the state."""
+    innovation, known = residual - slopes @ state, slopes @ covariance @ slopes.T
     widened = max((DEGREES_OF_FREEDOM + _squared_distance(innovation, known, variance)) / _WITH_POSE, 1.0)
-    gain = covariance @ both.T @ np.linalg.inv(_total(known, widened * variance))
+    gain = covariance @ slopes.T @ np.linalg.inv(_total(known, widened * variance))
     state += gain @ innovation
-    covariance -= gain @ (both @ covariance)
+    covariance -= gain @ (slopes @ covariance)
 
 
 @compiled()
-def _estimate(state: Floats, covariance: Floats, ahead: float, estimate: Floats) -> None:
-    """Write parameters and standard errors into `estimate` (2, m), with the share `ahead` of the fast part."""
-    m = len(state) // 2
+def _estimate(state: Floats, covariance: Floats, ahead: float, fast: int, estimate: Floats) -> None:
+    """Write parameters and standard errors into `estimate` (2, m), with the share `ahead` of `fast` fast parts."""
+    m = len(state) - fast
     for k in range(m):
-        estimate[0, k] = state[k] + ahead * state[m + k]
-        own = covariance[k, k] + 2.0 * ahead * covariance[k, m + k] + ahead * ahead * covariance[m + k, m + k]
+        estimate[0, k], own = state[k], covariance[k, k]
+        if k < fast:
+            estimate[0, k] += ahead * state[m + k]
+            own += 2.0 * ahead * covariance[k, m + k] + ahead * ahead * covariance[m + k, m + k]
         estimate[1, k] = math.sqrt(max(own, 0.0))
 
 
 @compiled()
 def _log_density(state: Floats, covariance: Floats, residual: Floats, slopes: Floats, variance: Floats) -> float:
     """Return the logarithm of the predictive density of the residual (3,) of a window, but for a constant."""
-    both = np.concatenate((slopes, slopes), axis=1)
-    known = both @ covariance @ both.T
-    squared = _squared_distance(residual - both @ state, known, variance)
+    known = slopes @ covariance @ slopes.T
+    squared = _squared_distance(residual - slopes @ state, known, variance)
     volume = math.log(np.linalg.det(_total(known, variance)))
     return -0.5 * (volume + _WITH_POSE * math.log1p(squared / DEGREES_OF_FREEDOM))
 

@@ -2,7 +2,7 @@
 
 A battery is charged, a linkage is knocked, another floor is driven on. The model of the selected effects has one value
 of each for all recordings. A recording's own value is estimated from the residuals of the windows that ended before a
-prediction begins.
+prediction begins. So are the nodal values of maps at commands that the training windows hardly have.
 """
 
 from __future__ import annotations
@@ -19,20 +19,22 @@ from scipy.special import expit
 from agvbench.diagnosis.criteria import VARYING
 from agvbench.diagnosis.data.window_splits import _initial_states
 from agvbench.diagnosis.free_driving.parameter_filter import filter_parameters
-from agvbench.diagnosis.free_driving.window_residuals import VaryingModel, WindowResiduals
+from agvbench.diagnosis.free_driving.varying_model import VaryingModel
+from agvbench.diagnosis.free_driving.window_residuals import WindowResiduals
 from agvbench.types import Floats
 
-_SCALES = 4
+_OWN_SCALES = 3
 _LEAST_VARIANCE = 1e-12
 _WIDE = 2.0
+_TYPICAL = {"rad": VARYING.offset_rad, "per_m": VARYING.offset_per_m, "": VARYING.gain}
 
 
 @dataclass(frozen=True)
 class Variation:
     """How much m quantities vary: standard deviations (m,) between recordings, and within one, for seconds.
 
-    ``drift_s``: time in which they drift as far as recordings differ. ``lack`` (4,): what the model lacks besides, in
-    units of `WindowResiduals.scale`; ``lack_alone`` (4,): what it lacks if nothing varies.
+    ``drift_s``: time in which they drift as far as recordings differ. ``lack`` (5,): what the model lacks besides, in
+    units of `WindowResiduals.scale`; ``lack_alone`` (5,): what it lacks if nothing varies.
     """
 
     between: Floats
@@ -42,19 +44,20 @@ class Variation:
     lack_alone: Floats
 
     @classmethod
-    def fitted(cls, model: VaryingModel, training: NDArray[np.bool_]) -> Variation:
+    def fitted(cls, model: VaryingModel, residuals: WindowResiduals, training: NDArray[np.bool_]) -> Variation:
         """Return the variation of maximum posterior density, given the residuals of the `training` windows (W,).
 
         Few recordings say little about how much recordings differ, and the maps absorb a part of that. The prior is
-        therefore the one of `VaryingCriteria`: log-normal, about what servos, floors and batteries differ by.
+        therefore the one of `VaryingCriteria`: log-normal, about what servos, floors and batteries differ by. The
+        components of the maps are left out: what the training windows determine varies little.
         """
-        residuals = model.residuals
+        m = len(model.quantities)
+        residuals = residuals.by_first(m)
         used = training[residuals.order] & np.isfinite(residuals.residual).all(axis=1)
-        offsets, m = np.array([not quantity.is_gain for quantity in model.quantities]), len(model.quantities)
-        between = np.where(offsets, VARYING.offset_rad, VARYING.gain)
-        usual = np.append(_usual_lack(residuals, used), VARYING.time_error_s)
+        between = np.array([_TYPICAL[quantity.unit] for quantity in model.quantities])
+        usual = np.append(_usual_lack(residuals, used), [VARYING.time_error_s, VARYING.at_beginning])
         mean = np.log(np.concatenate([between, VARYING.share_within * between, [VARYING.drift_s], usual]))
-        of_lack = [_WIDE] * (_SCALES - 1) + [VARYING.spread_time_error]
+        of_lack = [*[_WIDE] * _OWN_SCALES, VARYING.spread_time_error, VARYING.spread_at_beginning]
         spread = np.repeat([VARYING.spread_between, VARYING.spread_within, VARYING.spread_drift], [m, m, 1])
 
         def with_variation(values: Floats) -> Floats:
@@ -68,14 +71,14 @@ class Variation:
         return cls(found[:m], found[m : 2 * m], found[2 * m], found[2 * m + 1 :], lack_alone)
 
     def estimates(self, residuals: WindowResiduals) -> tuple[Floats, Floats]:
-        """Return the quantities at the beginning of each window and their standard errors, both (W, m).
+        """Return quantities and map components at the beginning of each window, and their standard errors, (W, m + r).
 
         They are means over two hypotheses: that the recording varies, and that it does not. Before the recording both
         are equally probable; its windows decide (Bayesian model averaging).
         """
         values, density = _filtered(residuals, self.between, self.within, self.drift_s, self.lack)
         none = np.zeros(len(self.between))
-        alone = _filtered(residuals, none, none, self.drift_s, self.lack_alone)[1]
+        alone = _filtered(residuals.by_first(len(none)), none, none, self.drift_s, self.lack_alone)[1]
         share = _probability(residuals, density - alone)[:, None]
         value, stderr = values[:, 0], values[:, 1]
         found = np.empty((2, *value.shape))
@@ -83,11 +86,13 @@ class Variation:
         return found[0], found[1]
 
 
-def at_end_of_recordings(model: VaryingModel, variation: Variation) -> dict[str, dict[str, dict[str, float]]]:
+def at_end_of_recordings(
+    model: VaryingModel, residuals: WindowResiduals, variation: Variation
+) -> dict[str, dict[str, dict[str, float]]]:
     """Return for each recording the quantities and their standard errors at its last window."""
-    values, stderr = variation.estimates(model.residuals)
-    recording, order = _initial_states(model.predictor.readings).recording, model.residuals.order.tolist()
-    last = {str(recording[i]): i for i in order}
+    values, stderr = variation.estimates(residuals)
+    recording = _initial_states(model.predictor.readings).recording
+    last = {str(recording[i]): i for i in residuals.order.tolist()}
     return {
         name: {
             quantity.name: {"value": float(values[i, k]), "stderr": float(stderr[i, k])}
@@ -113,13 +118,17 @@ def _most_likely(density: Callable[[Floats], Floats], mean: Floats, spread: Floa
 def _filtered(
     residuals: WindowResiduals, between: Floats, within: Floats, drift_s: float, lack: Floats
 ) -> tuple[Floats, Floats]:
-    """Return estimates with their standard errors (W, 2, m) and log predictive densities (W,), in the order."""
-    count = len(residuals.order)
+    """Return estimates with their standard errors (W, 2, m + r) and log predictive densities (W,), in the order.
+
+    The map components (r,) are in units of their standard deviations.
+    """
+    count, values = len(residuals.order), residuals.slopes.shape[2]
+    slow = np.append(between**2, np.ones(values - len(between)))
     variance = residuals.noise + np.sum((lack[:, None] * residuals.scale) ** 2, axis=1) + _LEAST_VARIANCE
-    estimates, density = np.empty((count, 2, len(between))), np.empty(count)
+    estimates, density = np.empty((count, 2, values)), np.empty(count)
     filter_parameters(
         residuals.restarts, residuals.begins_s, residuals.ends_s, residuals.residual, residuals.slopes, variance,
-        between**2, within**2, np.array([drift_s, VARYING.within_s]), VARYING.ahead_s, estimates, density,
+        slow, within**2, np.array([drift_s, VARYING.within_s]), VARYING.ahead_s, estimates, density,
     )  # fmt: skip
     return estimates, density
 
@@ -141,6 +150,6 @@ def _probability(residuals: WindowResiduals, evidence: Floats) -> Floats:
 
 def _usual_lack(residuals: WindowResiduals, used: NDArray[np.bool_]) -> Floats:
     """Return half of the median residual of the windows `used`, per distance along, across and in heading (3,)."""
-    own = np.array([residuals.scale[used, a, a] for a in range(_SCALES - 1)]).T
+    own = np.array([residuals.scale[used, a, a] for a in range(_OWN_SCALES)]).T
     share = np.abs(residuals.residual[used]) / own
-    return np.maximum(0.5 * np.median(share, axis=0) if len(share) else np.zeros(_SCALES - 1), _WIDE * 1e-4)
+    return np.maximum(0.5 * np.median(share, axis=0) if len(share) else np.zeros(_OWN_SCALES), _WIDE * 1e-4)

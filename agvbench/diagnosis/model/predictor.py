@@ -88,6 +88,12 @@ class Predictor:
         self._is_discrete = np.array([name in discrete for name in self.parameter_names], dtype=np.bool_)
         self._last: tuple[tuple[bytes, ...], Floats] = (), np.empty(0)
 
+    @property
+    def steering_limits(self) -> tuple[float, float]:
+        """The lowest and highest value of the steering maps: angles [rad], or a yaw rate [rad/s]."""
+        most = MAX_YAW_RATE if self.batch.geometry.is_differential else MAX_ANGLE_RAD
+        return -most, most
+
     def prior(self, parameters: Floats) -> PriorTerms:
         """Return the priors of the maps and of the effects at `parameters` (P,)."""
         of_maps = self.batch.smoothness.terms(parameters)
@@ -116,8 +122,7 @@ class Predictor:
         """Return steady-state values of every row (rows, 3) and initial states (R, 7)."""
         where, run = self.maps.slices(), self.batch.base.row_runs
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
-        most = MAX_YAW_RATE if self.batch.geometry.is_differential else MAX_ANGLE_RAD
-        front, rear = (np.clip(values[k] + random_effects[run, 3 + k], -most, most) for k in (0, 1))
+        front, rear = (np.clip(values[k] + random_effects[run, 3 + k], *self.steering_limits) for k in (0, 1))
         front = np.where(self.batch.acting["front"], front, 0.0)
         speed = np.where(self.batch.acting["drive"], values[2] * np.exp(random_effects[run, 5]), 0.0)
         initial = np.zeros((len(self.readings), 7))

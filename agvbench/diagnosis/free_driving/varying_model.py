@@ -1,0 +1,104 @@
+"""A fitted model of which steering, drive and maps have other values in each window.
+
+Two kinds of values differ: what varies between recordings, such as the level of the drive, and nodal values of the maps
+that the training windows hardly determine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from agvbench.diagnosis.criteria import VARYING
+from agvbench.diagnosis.model.nodal_maps import ROLES
+from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.types import Floats
+
+_LEAST_SIZE = 1e-3
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What may vary: the offset or the gain of a channel's static map. Gains are natural logarithms of factors.
+
+    The offset of a steered axle is an angle. That of a differential vehicle's yaw rate is proportional to the speed,
+    as with wheels of unequal diameters: a curvature.
+    """
+
+    role: str
+    unit: str = ""
+
+    @property
+    def is_gain(self) -> bool:
+        """Whether this is a gain, which has no unit."""
+        return not self.unit
+
+    @property
+    def name(self) -> str:
+        """The name with its unit, such as ``front_offset_rad``."""
+        return f"{self.role}_offset_{self.unit}" if self.unit else f"{self.role}_gain"
+
+
+@dataclass(frozen=True)
+class VaryingModel:
+    """A fitted model; ``covariance`` (N, N) is that of the nodal values of its maps."""
+
+    predictor: Predictor
+    parameters: Floats
+    covariance: Floats
+
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What may vary: offset and gain of each channel that steers, and the gain of the drive.
+
+        A channel with one command in all windows does not steer.
+        """
+        nodes = self.predictor.maps.nodes
+        unit = "per_m" if self.predictor.batch.geometry.is_differential else "rad"
+        steered = [role for role in ROLES if role != "drive" and len(nodes[role]) > 1]
+        return (*(Quantity(role, of) for role in steered for of in (unit, "")), Quantity("drive"))
+
+    @cached_property
+    def map_components(self) -> Floats:
+        """Changes of the nodal values (r, N) of one standard deviation: principal components of their uncertainty.
+
+        Components that change no map by `VaryingCriteria.least_map_change` of its largest value are left out.
+        """
+        maps, values = self.predictor.maps, self.parameters
+        own = maps.slices()
+        steering = values[: own["drive"].start]
+        sizes = np.empty(maps.size)
+        for where, of in ((slice(0, len(steering)), steering), (own["drive"], values[own["drive"]])):
+            sizes[where] = max(float(np.max(np.abs(of), initial=0.0)), _LEAST_SIZE)
+        variance, axes = np.linalg.eigh(self.covariance / np.outer(sizes, sizes))
+        components = (axes * np.sqrt(np.maximum(variance, 0.0))).T[::-1]
+        kept = np.max(np.abs(components), axis=1) > VARYING.least_map_change
+        return np.asarray(components[kept][: VARYING.max_map_components] * sizes)
+
+    def poses(self, values: Floats) -> Floats:
+        """Return the predicted poses (W, K, 3) for `values` (W, m + r) of the quantities and of the map components."""
+        batch, quantities = self.predictor.batch, self.quantities
+        settled, initial = self.predictor.settled(self.parameters)
+        self._add_components(settled, values[:, len(quantities) :])
+        of_row = values[batch.base.row_runs]
+        for k, quantity in enumerate(quantities):
+            column = ROLES.index(quantity.role)
+            if quantity.is_gain:
+                settled[:, column] *= np.exp(of_row[:, k])
+            else:
+                by_speed = settled[:, ROLES.index("drive")] if batch.geometry.is_differential else 1.0
+                settled[:, column] += of_row[:, k] * by_speed
+            if quantity.role != "drive":
+                settled[:, column] = np.clip(settled[:, column], *self.predictor.steering_limits)
+        parameters, deviation = self.predictor.all_parameters(self.parameters), batch.nodal_deviation
+        poses = batch.base.predict(settled, parameters, initial, nodal_deviation=deviation)
+        return poses.reshape(len(values), -1, 3)
+
+    def _add_components(self, settled: Floats, values: Floats) -> None:
+        """Add what the map components with `values` (W, r) change in every row (rows, 3)."""
+        batch = self.predictor.batch
+        nodal = (values @ self.map_components)[batch.base.row_runs]
+        for role, own in self.predictor.maps.slices().items():
+            settled[:, ROLES.index(role)] += np.sum(batch.weights[role] * nodal[:, own], axis=1)
