@@ -3,7 +3,7 @@
 Each recording of `perf_measured.py` is driven again by static maps fitted to it, with its commands, frame times, gaps
 and noise; planted are an effect of the library, another clock or another level of the drive in the last session, or
 nothing. Printed: for each the verdicts, names and sizes, and at the end how many names were right. Run with
-``python benchmarks/perf/perf_replayed.py [VEHICLE ...] [--replays N] [--first-seed S]``.
+``python benchmarks/perf/perf_replayed.py [VEHICLE ...] [--replays N] [--first-seed S] [--nothing]``.
 """
 
 from __future__ import annotations
@@ -146,13 +146,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("vehicles", nargs="*", default=list(SPLITS), metavar="VEHICLE")
     parser.add_argument("--replays", type=int, default=2)
     parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--nothing", action="store_true", help="plant nothing: only controls")
     wanted = parser.parse_args(arguments)
     console = Console(width=None if sys.stdout.isatty() else 160)
     count = {"nothing planted": 0, "a name there": 0, "planted": 0, "found": 0, "wrong names": 0}
     for vehicle in wanted.vehicles:
         source = Source.of(vehicle)
         sessions = len({run.session for run in source.runs})
-        for planted in (*PLANTED, *OWN.get(vehicle, ())):
+        for planted in (Planted(),) if wanted.nothing else (*PLANTED, *OWN.get(vehicle, ())):
             if (planted.clock_s or planted.speed != 1.0) and sessions < 2:
                 continue
             if planted.effect and planted.effect[0] in SLOW.get(vehicle, {}):

@@ -147,7 +147,7 @@ class WindowConclusion:
         variation, names = self._variation, [quantity.name for quantity in self._chosen.quantities]
         return {
             "between_recordings": dict(zip(names, variation.between.tolist(), strict=True)),
-            "within_recordings": dict(zip(names, variation.within.tolist(), strict=True)),
+            "within_recordings": dict(zip(names, variation.within.tolist(), strict=False)),
             "drift_s": variation.drift_s,
             "map_components": len(self._chosen.map_components),
             "recordings": at_end_of_recordings(self._chosen, self._residuals, variation),

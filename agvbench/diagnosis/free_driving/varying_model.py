@@ -17,6 +17,7 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.types import Floats
 
 _LEAST_SIZE = 1e-3
+_RAD, _PER_M = "rad", "per_m"
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,11 @@ class Quantity:
         return not self.unit
 
     @property
+    def varies_within(self) -> bool:
+        """Whether it may also vary for seconds: not a curvature, since wheels keep their diameters for so long."""
+        return self.unit != _PER_M
+
+    @property
     def name(self) -> str:
         """The name with its unit, such as ``front_offset_rad``."""
         return f"{self.role}_offset_{self.unit}" if self.unit else f"{self.role}_gain"
@@ -53,12 +59,13 @@ class VaryingModel:
     def quantities(self) -> tuple[Quantity, ...]:
         """What may vary: offset and gain of each channel that steers, and the gain of the drive.
 
-        A channel with one command in all windows does not steer.
+        A channel with one command in all windows does not steer. Quantities that vary within a recording come first.
         """
         nodes = self.predictor.maps.nodes
-        unit = "per_m" if self.predictor.batch.geometry.is_differential else "rad"
+        unit = _PER_M if self.predictor.batch.geometry.is_differential else _RAD
         steered = [role for role in ROLES if role != "drive" and len(nodes[role]) > 1]
-        return (*(Quantity(role, of) for role in steered for of in (unit, "")), Quantity("drive"))
+        found = [*(Quantity(role, of) for role in steered for of in (unit, "")), Quantity("drive")]
+        return tuple(sorted(found, key=lambda quantity: not quantity.varies_within))
 
     @cached_property
     def map_components(self) -> Floats:

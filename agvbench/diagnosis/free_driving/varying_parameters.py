@@ -31,7 +31,7 @@ _TYPICAL = {"rad": VARYING.offset_rad, "per_m": VARYING.offset_per_m, "": VARYIN
 
 @dataclass(frozen=True)
 class Variation:
-    """How much m quantities vary: standard deviations (m,) between recordings, and within one, for seconds.
+    """How much m quantities vary: standard deviations (m,) between recordings, and (f,) of the first f for seconds.
 
     ``drift_s``: time in which they drift as far as recordings differ. ``lack`` (5,): what the model lacks besides, in
     units of `WindowResiduals.scale`; ``lack_alone`` (5,): what it lacks if nothing varies.
@@ -51,24 +51,27 @@ class Variation:
         therefore the one of `VaryingCriteria`: log-normal, about what servos, floors and batteries differ by. The
         components of the maps are left out: what the training windows determine varies little.
         """
-        m = len(model.quantities)
+        m, f = len(model.quantities), sum(quantity.varies_within for quantity in model.quantities)
         residuals = residuals.by_first(m)
         used = training[residuals.order] & np.isfinite(residuals.residual).all(axis=1)
         between = np.array([_TYPICAL[quantity.unit] for quantity in model.quantities])
         usual = np.append(_usual_lack(residuals, used), [VARYING.time_error_s, VARYING.at_beginning])
-        mean = np.log(np.concatenate([between, VARYING.share_within * between, [VARYING.drift_s], usual]))
+        mean = np.log(np.concatenate([between, VARYING.share_within * between[:f], [VARYING.drift_s], usual]))
         of_lack = [*[_WIDE] * _OWN_SCALES, VARYING.spread_time_error, VARYING.spread_at_beginning]
-        spread = np.repeat([VARYING.spread_between, VARYING.spread_within, VARYING.spread_drift], [m, m, 1])
+        spread = np.repeat([VARYING.spread_between, VARYING.spread_within, VARYING.spread_drift], [m, f, 1])
+
+        def parts(values: Floats) -> tuple[Floats, Floats, float, Floats]:
+            return values[:m], values[m : m + f], values[m + f], values[m + f + 1 :]
 
         def with_variation(values: Floats) -> Floats:
-            return _filtered(residuals, values[:m], values[m : 2 * m], values[2 * m], values[2 * m + 1 :])[1][used]
+            return _filtered(residuals, *parts(values))[1][used]
 
         def alone(values: Floats) -> Floats:
-            return _filtered(residuals, np.zeros(m), np.zeros(m), VARYING.drift_s, values)[1][used]
+            return _filtered(residuals, np.zeros(m), np.zeros(f), VARYING.drift_s, values)[1][used]
 
         found = _most_likely(with_variation, mean, np.append(spread, of_lack))
-        lack_alone = _most_likely(alone, mean[2 * m + 1 :], np.array(of_lack))
-        return cls(found[:m], found[m : 2 * m], found[2 * m], found[2 * m + 1 :], lack_alone)
+        lack_alone = _most_likely(alone, mean[m + f + 1 :], np.array(of_lack))
+        return cls(*parts(found), lack_alone)
 
     def estimates(self, residuals: WindowResiduals) -> tuple[Floats, Floats]:
         """Return quantities and map components at the beginning of each window, and their standard errors, (W, m + r).
@@ -77,8 +80,8 @@ class Variation:
         are equally probable; its windows decide (Bayesian model averaging).
         """
         values, density = _filtered(residuals, self.between, self.within, self.drift_s, self.lack)
-        none = np.zeros(len(self.between))
-        alone = _filtered(residuals.by_first(len(none)), none, none, self.drift_s, self.lack_alone)[1]
+        nothing = np.zeros_like(self.between), np.zeros_like(self.within)
+        alone = _filtered(residuals.by_first(len(self.between)), *nothing, self.drift_s, self.lack_alone)[1]
         share = _probability(residuals, density - alone)[:, None]
         value, stderr = values[:, 0], values[:, 1]
         found = np.empty((2, *value.shape))
