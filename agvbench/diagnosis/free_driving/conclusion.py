@@ -71,13 +71,13 @@ class WindowConclusion:
     def diagnosis(self, horizon: Horizon) -> Diagnosis:
         """Return the diagnosis."""
         context, chosen = self.context, self.selection.chosen
-        poses = self._poses(chosen)
+        poses = self._chosen.poses(self._variation.estimates(self._residuals)[0])[self.assessed]
         static = Predictor(Batch(self.assessment, self.static.predictor.maps, context.geometry))
         predicted = {
             "static": static.predict(self.static.parameters),
             "speed_held": speed_held(static.batch, self.static.parameters),
             "naive": constant_velocity(self.assessment),
-            "population": self._chosen.predictor.predict(chosen.fit.parameters)[self.assessed],
+            "population": self._as_fitted(chosen.fit),
             "after": poses,
         }
         before = predicted["static"]
@@ -127,7 +127,7 @@ class WindowConclusion:
                 "varying": self._varying_parameters(),
                 "commands": {role: of_channel.to_table() for role, of_channel in ranges.items()},
                 "recordings": errors.by_recording(self.held, beyond),
-                "effects": self._effect_errors(predicted["after"]),
+                "effects": self._effect_errors(predicted["population"]),
             },
         }
 
@@ -153,21 +153,11 @@ class WindowConclusion:
             "recordings": at_end_of_recordings(self._chosen, self._residuals, variation),
         }
 
-    def _poses(self, model: ScoredModel) -> Floats:
-        """Return the poses that `model` predicts for every assessed window, with what the windows before it say."""
-        is_chosen = model is self.selection.chosen
-        varying = self._chosen if is_chosen else self._varying(model)
-        residuals = self._residuals if is_chosen else WindowResiduals.of(varying)
-        return varying.poses(self._variation.estimates(residuals)[0])[self.assessed]
-
-    def _varying(self, model: ScoredModel) -> VaryingModel:
-        fitted = model.fit
-        predictor, nodal = Predictor(self._every, fitted.predictor.effects), slice(fitted.predictor.maps.size)
-        return VaryingModel(predictor, fitted.parameters, fitted.covariance[nodal, nodal])
-
     @cached_property
     def _chosen(self) -> VaryingModel:
-        return self._varying(self.selection.chosen)
+        fitted, nodal = self.selection.chosen.fit, slice(self.selector.batch.maps.size)
+        predictor = Predictor(self._every, fitted.predictor.effects)
+        return VaryingModel(predictor, fitted.parameters, fitted.covariance[nodal, nodal])
 
     @cached_property
     def _residuals(self) -> WindowResiduals:
@@ -175,7 +165,7 @@ class WindowConclusion:
 
     @cached_property
     def _variation(self) -> Variation:
-        """How much steering and drive vary beside the chosen model; with other models it is taken to be the same."""
+        """How much steering and drive vary beside the chosen model."""
         return Variation.fitted(self._chosen, self._residuals, self.split.training)
 
     @cached_property
@@ -215,6 +205,7 @@ class WindowConclusion:
     def _effect_errors(self, poses: Floats) -> dict[str, dict[str, object]]:
         """Return for each effect whether it was selected, and the position error with and without it.
 
+        Both are those of models as fitted, because estimates from earlier windows take the place of a missing effect.
         An effect without predicted gain was not fitted: its gain is zero, and it has no error.
         """
         chosen = self.selection.chosen
@@ -228,7 +219,7 @@ class WindowConclusion:
                 other: ScoredModel | None = self.selector.without_effect(self.selection.base, chosen, name)
             else:
                 other = self.selector.known((*chosen.names, name))
-            error = None if other is None else self._error(self._poses(other))
+            error = None if other is None else self._error(self._as_fitted(other.fit))
             out[cause_of(name)] = {
                 "kept": kept,
                 "gain": self.selection.gains[name] if kept else chosen.deviance - other.deviance if other else 0.0,
@@ -236,6 +227,10 @@ class WindowConclusion:
                 "held_out_position_mm": {"with": now if kept else error, "without": error if kept else now},
             }
         return out
+
+    def _as_fitted(self, fitted: Fit) -> Floats:
+        """Return the poses that a model predicts for every assessed window."""
+        return Predictor(self._every, fitted.predictor.effects).predict(fitted.parameters)[self.assessed]
 
     def _error(self, poses: Floats) -> float:
         name = "position_rms_mm"
