@@ -56,7 +56,6 @@ class DiagnosisContext:
         criteria = stated_criteria(FREE_DRIVING if windows else SELECTION, with_priors=bool(self.priors))
         if windows:
             criteria |= {"drive_level": asdict(FREE_DRIVING_LEVEL), "session_clock": asdict(SESSION_CLOCK)}
-        if windows and not self.geometry.is_differential:
             criteria |= {"varying": asdict(VARYING)}
         logged: dict[str, object] = {}
         if stated := readings.logged.stated():

@@ -11,12 +11,16 @@ from typing import cast
 
 import numpy as np
 import pytest
+from differential_vehicle import HEADER, Campaign, Differential
 from free_drives import FREE_HEADER, free_runs, joystick
 from hypothesis import given
 from hypothesis import strategies as st
 from tiny_vehicle import NEUTRAL, Tiny
 
 from agvbench.diagnosis import diagnose
+from agvbench.diagnosis.data.readings import read_windows
+from agvbench.diagnosis.data.windows import Horizon
+from agvbench.diagnosis.free_driving.method import static_maps
 from agvbench.diagnosis.free_driving.parameter_filter import filter_parameters
 from agvbench.diagnosis.free_driving.varying_model import VaryingModel
 from agvbench.diagnosis.free_driving.varying_parameters import _probability
@@ -234,6 +238,28 @@ def test_components_of_the_maps_are_their_covariance(seed):
     model = VaryingModel(predictor, values, spread @ spread.T)
     np.testing.assert_allclose(model.map_components.T @ model.map_components, spread @ spread.T, rtol=0.05, atol=0.05)
     assert not len(VaryingModel(predictor, values, 1e-8 * spread @ spread.T).map_components)
+
+
+def test_a_fast_turn_of_a_differential_vehicle_is_predicted_as_fitted_where_nothing_varies():
+    runs = list(Campaign(Differential(), sessions=1, seconds=20.0))
+    neutral, geometry = HEADER.neutral, HEADER.geometry
+    readings = read_windows(runs, Horizon(), neutral, turns_on_the_spot=True)
+    fitted = static_maps(readings, runs, geometry, neutral)
+    parameters = fitted.parameters.copy()
+    parameters[fitted.predictor.maps.slices()["front"]] *= 4.0
+    assert max(parameters[fitted.predictor.maps.slices()["front"]]) > 2.0  # rad/s, more than an axle angle may be
+    nodal = fitted.predictor.maps.size
+    model = VaryingModel(fitted.predictor, parameters, fitted.covariance[:nodal, :nodal])
+    nothing = np.zeros((len(readings), len(model.quantities) + len(model.map_components)))
+    np.testing.assert_array_equal(model.poses(nothing), model.as_fitted)
+
+
+def test_the_curvature_of_a_differential_vehicle_varies_between_recordings_only():
+    provenance = diagnose(Campaign(Differential(right_wheel=1.03))).provenance
+    assert provenance["criteria"]["varying"]["offset_per_m"] > 0.0
+    varying = provenance["windows"]["varying"]
+    assert {*varying["between_recordings"]} == {"front_gain", "drive_gain", "front_offset_per_m"}
+    assert {*varying["within_recordings"]} == {"front_gain", "drive_gain"}
 
 
 def test_a_vehicle_that_stays_the_same_is_predicted_as_well():

@@ -7,7 +7,6 @@ import numpy as np
 from agvbench.calibration.campaign_protocol import HeaderLike
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.nodal_maps import NodalMaps
-from agvbench.diagnosis.model.predictor import MAX_ANGLE_RAD, MAX_YAW_RATE
 from agvbench.effects import Effect, effect_kinds
 from agvbench.effects.variants import effect_variants
 from agvbench.model import VehicleModel
@@ -22,9 +21,9 @@ def corrected_vehicle(header: HeaderLike, geometry: Geometry, fitted: Fit, maps:
     """Return the vehicle of `fitted` with its priors; its maps are tables, made monotone by isotonic regression."""
     where = maps.slices()
     weight = np.maximum(np.diagonal(fitted.information.total), 1e-6)
-    most = MAX_YAW_RATE if geometry.is_differential else MAX_ANGLE_RAD
+    limits = fitted.predictor.steering_limits
     values = {
-        role: fitted.parameters[own] if role == "drive" else np.clip(fitted.parameters[own], -most, most)
+        role: fitted.parameters[own] if role == "drive" else np.clip(fitted.parameters[own], *limits)
         for role, own in where.items()
     }
     tables: dict[str, StaticMap] = {}

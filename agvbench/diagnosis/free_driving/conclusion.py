@@ -71,13 +71,13 @@ class WindowConclusion:
     def diagnosis(self, horizon: Horizon) -> Diagnosis:
         """Return the diagnosis."""
         context, chosen = self.context, self.selection.chosen
-        poses = self._chosen.poses(self._variation.estimates(self._residuals)[0])[self.assessed]
+        poses = self._chosen.poses(self._estimates[0])[self.assessed]
         static = Predictor(Batch(self.assessment, self.static.predictor.maps, context.geometry))
         predicted = {
             "static": static.predict(self.static.parameters),
             "speed_held": speed_held(static.batch, self.static.parameters),
             "naive": constant_velocity(self.assessment),
-            "population": self._as_fitted(chosen.fit),
+            "population": self._chosen.as_fitted[self.assessed],
             "after": poses,
         }
         before = predicted["static"]
@@ -144,13 +144,14 @@ class WindowConclusion:
 
     def _varying_parameters(self) -> dict[str, object]:
         """Return how much steering and drive vary, and what they were at the end of each recording."""
-        variation, names = self._variation, [quantity.name for quantity in self._chosen.quantities]
+        variation, quantities = self._variation, self._chosen.quantities
+        names, within = [q.name for q in quantities], [q.name for q in quantities if q.varies_within]
         return {
             "between_recordings": dict(zip(names, variation.between.tolist(), strict=True)),
-            "within_recordings": dict(zip(names, variation.within.tolist(), strict=False)),
+            "within_recordings": dict(zip(within, variation.within.tolist(), strict=True)),
             "drift_s": variation.drift_s,
             "map_components": len(self._chosen.map_components),
-            "recordings": at_end_of_recordings(self._chosen, self._residuals, variation),
+            "recordings": at_end_of_recordings(self._chosen, self._residuals, *self._estimates),
         }
 
     @cached_property
@@ -167,6 +168,10 @@ class WindowConclusion:
     def _variation(self) -> Variation:
         """How much steering and drive vary beside the chosen model."""
         return Variation.fitted(self._chosen, self._residuals, self.split.training)
+
+    @cached_property
+    def _estimates(self) -> tuple[Floats, Floats]:
+        return self._variation.estimates(self._residuals)
 
     @cached_property
     def _every(self) -> Batch:

@@ -35,9 +35,8 @@ def filter_parameters(
 
     Each parameter is a random walk, and the first ones are the sum of one and of a first-order autoregressive process
     (Ornstein–Uhlenbeck), all zero in the mean (Durbin and Koopman 2012, Time series analysis by state space methods,
-    chapters 3 and 4). A
-    residual far from its prediction counts less, by the weight of Student's t distribution. Windows that overlap one
-    that was used are left out, because their residuals are correlated.
+    chapters 3 and 4). A residual far from its prediction counts less, by the weight of Student's t distribution.
+    Windows that overlap one that was used are left out, because their residuals are correlated.
 
     Parameters
     ----------
@@ -74,14 +73,14 @@ def filter_parameters(
         else:
             while pending < i and ends_s[pending] <= begins_s[i]:
                 if begins_s[pending] >= used_s and not np.isnan(residual[pending, 0]):
-                    _update(state, covariance, residual[pending], _by_state(slopes[pending], fast), variance[pending])
+                    _update(state, covariance, residual[pending], slopes[pending], variance[pending])
                     used_s = ends_s[pending]
                 pending += 1
             _drift(state, covariance, slow, fast, times_s, max(begins_s[i] - begins_s[i - 1], 0.0))
-        _estimate(state, covariance, math.exp(-ahead_s / times_s[1]), len(fast), estimates[i])
+        _estimate(state, covariance, math.exp(-ahead_s / times_s[1]), estimates[i])
         density[i] = 0.0
         if not np.isnan(residual[i, 0]):
-            density[i] = _log_density(state, covariance, residual[i], _by_state(slopes[i], fast), variance[i])
+            density[i] = _log_density(state, covariance, residual[i], slopes[i], variance[i])
 
 
 @compiled()
@@ -96,9 +95,9 @@ def _begin(state: Floats, covariance: Floats, slow: Floats, fast: Floats) -> Non
 
 
 @compiled()
-def _by_state(slopes: Floats, fast: Floats) -> Floats:
-    """Return the derivatives (3, m + f) by the state, from those by the parameters (3, m)."""
-    return np.concatenate((slopes, slopes[:, : len(fast)]), axis=1)
+def _by_state(slopes: Floats, state: Floats) -> Floats:
+    """Return the derivatives (3, m + f) by the state (m + f,), from those by the parameters (3, m)."""
+    return np.concatenate((slopes, slopes[:, : len(state) - slopes.shape[1]]), axis=1)
 
 
 @compiled()
@@ -117,21 +116,22 @@ def _drift(state: Floats, covariance: Floats, slow: Floats, fast: Floats, times_
 
 @compiled()
 def _update(state: Floats, covariance: Floats, residual: Floats, slopes: Floats, variance: Floats) -> None:
-    """Update the state by the residual (3,) of a window, with its `slopes` by the state."""
-    innovation, known = residual - slopes @ state, slopes @ covariance @ slopes.T
+    """Update the state by the residual (3,) of a window."""
+    by_state = _by_state(slopes, state)
+    innovation, known = residual - by_state @ state, by_state @ covariance @ by_state.T
     widened = max((DEGREES_OF_FREEDOM + _squared_distance(innovation, known, variance)) / _WITH_POSE, 1.0)
-    gain = covariance @ slopes.T @ np.linalg.inv(_total(known, widened * variance))
+    gain = covariance @ by_state.T @ np.linalg.inv(_total(known, widened * variance))
     state += gain @ innovation
-    covariance -= gain @ (slopes @ covariance)
+    covariance -= gain @ (by_state @ covariance)
 
 
 @compiled()
-def _estimate(state: Floats, covariance: Floats, ahead: float, fast: int, estimate: Floats) -> None:
-    """Write parameters and standard errors into `estimate` (2, m), with the share `ahead` of `fast` fast parts."""
-    m = len(state) - fast
+def _estimate(state: Floats, covariance: Floats, ahead: float, estimate: Floats) -> None:
+    """Write parameters and standard errors into `estimate` (2, m), with the share `ahead` of the fast parts."""
+    m = estimate.shape[1]
     for k in range(m):
         estimate[0, k], own = state[k], covariance[k, k]
-        if k < fast:
+        if k < len(state) - m:
             estimate[0, k] += ahead * state[m + k]
             own += 2.0 * ahead * covariance[k, m + k] + ahead * ahead * covariance[m + k, m + k]
         estimate[1, k] = math.sqrt(max(own, 0.0))
@@ -140,8 +140,9 @@ def _estimate(state: Floats, covariance: Floats, ahead: float, fast: int, estima
 @compiled()
 def _log_density(state: Floats, covariance: Floats, residual: Floats, slopes: Floats, variance: Floats) -> float:
     """Return the logarithm of the predictive density of the residual (3,) of a window, but for a constant."""
-    known = slopes @ covariance @ slopes.T
-    squared = _squared_distance(residual - slopes @ state, known, variance)
+    by_state = _by_state(slopes, state)
+    known = by_state @ covariance @ by_state.T
+    squared = _squared_distance(residual - by_state @ state, known, variance)
     volume = math.log(np.linalg.det(_total(known, variance)))
     return -0.5 * (volume + _WITH_POSE * math.log1p(squared / DEGREES_OF_FREEDOM))
 

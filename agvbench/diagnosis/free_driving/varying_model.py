@@ -71,18 +71,22 @@ class VaryingModel:
     def map_components(self) -> Floats:
         """Changes of the nodal values (r, N) of one standard deviation: principal components of their uncertainty.
 
-        Components that change no map by `VaryingCriteria.least_map_change` of its largest value are left out.
+        Components that change no map by `VaryingCriteria.least_map_change` of its largest value are left out. There are
+        at most `max_map_components`, those of the largest variances.
         """
-        maps, values = self.predictor.maps, self.parameters
-        own = maps.slices()
-        steering = values[: own["drive"].start]
-        sizes = np.empty(maps.size)
-        for where, of in ((slice(0, len(steering)), steering), (own["drive"], values[own["drive"]])):
-            sizes[where] = max(float(np.max(np.abs(of), initial=0.0)), _LEAST_SIZE)
+        maps = self.predictor.maps
+        drive, sizes = maps.slices()["drive"], np.empty(maps.size)
+        for own in (slice(0, drive.start), drive):
+            sizes[own] = max(float(np.max(np.abs(self.parameters[own]), initial=0.0)), _LEAST_SIZE)
         variance, axes = np.linalg.eigh(self.covariance / np.outer(sizes, sizes))
         components = (axes * np.sqrt(np.maximum(variance, 0.0))).T[::-1]
         kept = np.max(np.abs(components), axis=1) > VARYING.least_map_change
         return np.asarray(components[kept][: VARYING.max_map_components] * sizes)
+
+    @property
+    def as_fitted(self) -> Floats:
+        """The predicted poses (W, K, 3) with none of the values changed."""
+        return self.predictor.predict(self.parameters)
 
     def poses(self, values: Floats) -> Floats:
         """Return the predicted poses (W, K, 3) for `values` (W, m + r) of the quantities and of the map components."""

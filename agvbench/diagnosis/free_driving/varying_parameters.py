@@ -90,10 +90,12 @@ class Variation:
 
 
 def at_end_of_recordings(
-    model: VaryingModel, residuals: WindowResiduals, variation: Variation
+    model: VaryingModel, residuals: WindowResiduals, values: Floats, stderr: Floats
 ) -> dict[str, dict[str, dict[str, float]]]:
-    """Return for each recording the quantities and their standard errors at its last window."""
-    values, stderr = variation.estimates(residuals)
+    """Return for each recording the quantities and their standard errors at its last window.
+
+    `values` and `stderr` (W, m + r) are those of `Variation.estimates`.
+    """
     recording = _initial_states(model.predictor.readings).recording
     last = {str(recording[i]): i for i in residuals.order.tolist()}
     return {

@@ -53,22 +53,15 @@ class WindowResiduals:
         """Return the residuals of all windows of a model, with none of the quantities changed."""
         readings = model.predictor.readings
         states = _initial_states(readings)
-        none = np.zeros((len(readings), len(model.quantities) + len(model.map_components)))
-        poses = model.poses(none)
-        heading = poses[:, _SAMPLE, 2]
-        slopes = np.empty((len(readings), 3, none.shape[1]))
-        for k in range(none.shape[1]):
-            changed = none.copy()
-            changed[:, k] = _STEP
-            slopes[..., k] = _turned(model.poses(changed)[:, _SAMPLE] - poses[:, _SAMPLE], heading) / _STEP
+        poses = model.as_fitted
         begins_s = 3600.0 * readings.started_h + states.t_s
         order = np.lexsort((begins_s, states.recording))
         recording = states.recording[order]
         elapsed_s = np.nan_to_num(readings.t_s - states.t_s[:, None])
-        residual = _turned(readings.poses[:, _SAMPLE] - poses[:, _SAMPLE], heading)
+        residual = _turned(readings.poses[:, _SAMPLE] - poses[:, _SAMPLE], poses[:, _SAMPLE, 2])
         # In a run's first second neither the motion filter nor the model of the actuators knows what was before.
         residual[states.t_s < _UNCERTAIN_S] = np.nan
-        of_windows = (begins_s, begins_s + elapsed_s[:, _SAMPLE], residual, slopes, _noise(readings, elapsed_s))
+        of_windows = (begins_s, begins_s + elapsed_s[:, _SAMPLE], residual, _slopes(model), _noise(readings, elapsed_s))
         history_s = DIFFERENTIAL_HISTORY_S if model.predictor.batch.geometry.is_differential else HISTORY_S
         begun = np.exp(-_TIME_CONSTANTS * states.t_s / history_s)
         scale = _scale(readings, poses, np.diff(elapsed_s, axis=1, prepend=0.0), begun)
@@ -77,6 +70,14 @@ class WindowResiduals:
             np.r_[True, recording[1:] != recording[:-1]],
             *(np.ascontiguousarray(values[order]) for values in (*of_windows, scale)),
         )
+
+
+def _slopes(model: VaryingModel) -> Floats:
+    """Return the derivatives (W, 3, m + r) of poses by what differs between recordings."""
+    poses = model.as_fitted[:, _SAMPLE]
+    steps = _STEP * np.eye(len(model.quantities) + len(model.map_components))
+    changes = [model.poses(np.tile(step, (len(poses), 1)))[:, _SAMPLE] - poses for step in steps]
+    return np.stack([_turned(change, poses[:, 2]) / _STEP for change in changes], axis=-1)
 
 
 def _turned(changes: Floats, heading: Floats) -> Floats:
