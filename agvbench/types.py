@@ -151,6 +151,19 @@ class Commands:
         """Return row `index` as a `Command`."""
         return Command(float(self.drive[index]), float(self.front[index]), float(self.rear[index]))
 
+    def without_repeats(self) -> Commands:
+        """Return the rows that differ from the row before: the same command over time, in fewer rows.
+
+        Examples
+        --------
+        >>> held = Commands(np.arange(4.0), np.array([1.0, 1.0, 2.0, 2.0]), np.zeros(4), np.zeros(4))
+        >>> held.without_repeats().t_s.tolist()
+        [0.0, 2.0]
+        """
+        rows = np.column_stack([self.drive, self.front, self.rear])
+        changes = np.append(True, np.any(rows[1:] != rows[:-1], axis=1))[: len(rows)]
+        return Commands(*(getattr(self, f.name)[changes] for f in fields(self)))
+
 
 @dataclass(frozen=True, eq=False)
 class Frames:

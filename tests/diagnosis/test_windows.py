@@ -212,6 +212,25 @@ def test_slopes_by_nodes_are_those_of_whole_maps(readings):
     np.testing.assert_allclose((there - back) / 2.0, expected, atol=2e-6)
 
 
+def test_commands_that_a_logger_repeats_are_simulated_once(readings):
+    some = readings.select(np.arange(0, len(readings), 9))
+    often = dataclasses.replace(some, runs=tuple(_repeated(run, 5) for run in some.runs))
+    ours, theirs = (Batch(each, smooth_maps(some.runs, NEUTRAL_COMMAND, 9, 6), GEOMETRY) for each in (some, often))
+    rows = sum(len(run.commands) for run in often.runs)
+    assert len(theirs.base.drive) == len(ours.base.drive) < rows / 4
+    values = np.r_[start_values_of_windows(ours.maps, some, GEOMETRY), 0.1, 0.05]
+    poses = [Predictor(batch, ("steering_lag", "cornering_speed_loss")).predict(values) for batch in (ours, theirs)]
+    np.testing.assert_array_equal(*poses)
+
+
+def _repeated(run: Run, times: int) -> Run:
+    """Return the run with every row of commands given several times, one after another."""
+    c, share = run.commands, np.arange(times) / times
+    t_s = c.t_s[:, None] + share * np.append(np.diff(c.t_s), 0.1)[:, None]
+    repeated = Commands(t_s.ravel(), *(np.repeat(values, times) for values in (c.drive, c.front, c.rear)))
+    return dataclasses.replace(run, commands=repeated)
+
+
 def test_start_values_are_near_the_maps_that_drove(readings):
     from tiny_vehicle import front_of, speed_of
 

@@ -106,7 +106,7 @@ class Readings:
         """Return the runs for simulation, at the times of the samples."""
         initial_states = [None] * len(self) if self.initial_states is None else self.initial_states.t_s.tolist()
         return [
-            SimulatedRun(run.commands, t, float(h), b, self._preset(run.commands), tuple(logged))
+            SimulatedRun(self._commands(run), t, float(h), b, self._preset(run.commands), tuple(logged))
             for run, t, h, b, logged in zip(
                 self.runs,
                 self.t_s,
@@ -116,6 +116,10 @@ class Readings:
                 strict=True,
             )
         ]
+
+    def _commands(self, run: Run) -> Commands:
+        """Return the commands of a run; those of windows without repeats, because loggers repeat them."""
+        return run.commands if self.initial_states is None else run.commands.without_repeats()
 
     def _preset(self, commands: Commands) -> tuple[float, float] | None:
         from_rest = self.initial_states is None

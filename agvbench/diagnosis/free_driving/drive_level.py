@@ -22,7 +22,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.window_splits import _initial_states
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.model.simulation.simulation import SimulatedRun, Simulation
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.signals import robust_std
 from agvbench.types import Commands, Floats
 
@@ -202,8 +202,8 @@ def _speed_deviations(predictor: Predictor, parameters: Floats) -> Floats:
     """Return the logarithm of the initial speed over the predicted one, (W,); NaN at low speed."""
     initial_states, batch = _initial_states(predictor.readings), predictor.batch
     short_runs = [
-        SimulatedRun(run.commands, np.array([b + _SHORT_S]), float(h), begins_s=float(b))
-        for run, h, b in zip(predictor.readings.runs, predictor.readings.started_h, initial_states.t_s, strict=True)
+        replace(run, t_s=np.array([begins_s + _SHORT_S]))
+        for run, begins_s in zip(predictor.readings.simulated(), initial_states.t_s.tolist(), strict=True)
     ]
     settled, initial = predictor.settled(parameters)
     initial[:, 3] = np.nan
