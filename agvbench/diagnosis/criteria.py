@@ -250,11 +250,11 @@ class DriveLevelCriteria:
 
 @dataclass(frozen=True)
 class VaryingCriteria:
-    """How much the steering and the drive may differ between recordings of free driving, and how fast they drift.
+    """How much steering, drive and clock may differ between recordings of free driving, and how fast they drift.
 
-    ``offset_rad``, ``offset_per_m``, ``gain``
+    ``offset_rad``, ``offset_per_m``, ``offset_s``, ``gain``
         Typical difference between recordings: of an axle angle [rad], of the curvature of a differential vehicle's
-        path [1/m], and of the logarithm of a gain.
+        path [1/m], of the clocks of camera and vehicle [s], and of the logarithm of a gain.
     ``share_within``
         Typical variation within a recording, for seconds, as a share of that.
     ``spread_between``, ``spread_within``
@@ -278,6 +278,7 @@ class VaryingCriteria:
 
     offset_rad: float = 0.02
     offset_per_m: float = 0.02
+    offset_s: float = 0.05
     gain: float = 0.1
     share_within: float = 0.3
     spread_between: float = 0.5

@@ -163,13 +163,13 @@ def sessions_in_words(content: Mapping[str, Any]) -> Iterator[str]:
 
 
 _CLEARLY = 3.0
-_NOTICEABLE = {"gain": 0.03, "offset_rad": 0.005, "offset_per_m": 0.005}
-_UNITS = {"offset_rad": "rad", "offset_per_m": "1/m"}
+_NOTICEABLE = {"gain": 0.03, "offset_rad": 0.005, "offset_per_m": 0.005, "offset_s": 0.02}
+_UNITS = {"offset_rad": "rad", "offset_per_m": "1/m", "offset_s": "s"}
 _MOST_LOG_GAIN = 3.0
 
 
 def _varying_in_words(varying: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what steering and drive were at the end of a recording, where they clearly differ from the maps."""
+    """Yield what steering, drive and clock were at the end of a recording, where they clearly differ from the model."""
     for recording, found in mapping(varying.get("recordings")).items():
         differing = []
         for name, entry in mapping(found).items():

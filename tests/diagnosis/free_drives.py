@@ -33,6 +33,14 @@ def calm(seconds: float, rng: np.random.Generator) -> Commands:
     return Commands(_times(seconds), drive, front, np.full_like(front, NEUTRAL))
 
 
+def stop_and_go(seconds: float, rng: np.random.Generator) -> Commands:
+    """Return the commands of a driver who sets another speed every second or two, a quarter of the time none."""
+    commands = joystick(seconds, rng)
+    changes = np.cumsum(rng.random(len(commands)) < _PERIOD_S / 1.5)
+    levels = rng.choice([1050.0, 1150.0, 1300.0, NEUTRAL], changes[-1] + 1)
+    return dataclasses.replace(commands, drive=levels[changes])
+
+
 def _times(seconds: float) -> np.ndarray:
     return _PERIOD_S * np.arange(round(seconds / _PERIOD_S))
 

@@ -1,4 +1,4 @@
-"""Steering and drive that differ between recordings: the filter beside a regression, and recordings of one vehicle."""
+"""Steering, drive and clock that differ between recordings: the filter beside a regression, and recordings."""
 
 from __future__ import annotations
 
@@ -151,7 +151,8 @@ class Recordings:
 
     In it the vehicle is steered beside what is recorded, by `steering_us`, and drives `faster`. If the drive is
     `held`, each recording has one drive command, which no other one has. In the morning the axles are steered by the
-    share `reach` of what they are in the evening. The front axle has an end stop, `limit_us` from neutral.
+    share `reach` of what they are in the evening. The front axle has an end stop, `limit_us` from neutral. Commands are
+    given `later_s` than the logger says in the evening.
     """
 
     header = FREE_HEADER
@@ -164,6 +165,7 @@ class Recordings:
         held: bool = False,
         reach: float = 1.0,
         limit_us: float = np.inf,
+        later_s: float = 0.0,
     ) -> None:
         self._held = itertools.cycle([1100.0, 1150.0, 1200.0, 1125.0] if held else [None])
         self._reach = itertools.cycle([reach, reach, reach, 1.0])
@@ -172,7 +174,8 @@ class Recordings:
             for *by, factor in ((0.0, np.inf, 1.0), (steering_us, limit_us, faster))
         )
         splits = ("fit", "fit", "fit", "held_out")
-        test = replace(driven[3], commands=recorded[3].commands)
+        logged = recorded[3].commands
+        test = replace(driven[3], commands=replace(logged, t_s=logged.t_s - later_s))
         self.runs = [
             replace(run, session="evening" if k == 3 else "morning", split=splits[k], extra={"source": f"{k}.csv"})
             for k, run in enumerate([*recorded[:3], test])
@@ -219,6 +222,18 @@ def test_a_drive_that_runs_faster_at_a_command_of_its_own_is_followed():
     assert value == pytest.approx(np.log(1.1), abs=0.04)
 
 
+@pytest.mark.parametrize("later_s", [-0.03, 0.03])
+def test_a_clock_that_is_less_off_than_a_session_must_be_is_followed(later_s):
+    found = diagnose(Recordings(later_s=later_s))
+    assert not found.provenance["windows"]["sessions"]["evening"]["clock_offset"]["significant"]
+    errors = held_out(found)
+    assert errors["after"] < 0.5 * errors["population"]
+    value, stderr = at_end(found, "clock_offset_s")
+    assert value == pytest.approx(later_s, abs=0.006)
+    assert 0.0 < stderr < 0.01
+    assert any("clock offset" in line for line in sessions_in_words({"provenance": found.provenance}))
+
+
 def test_a_map_beyond_the_training_commands_is_followed():
     found = diagnose(Recordings(reach=0.5, limit_us=200.0))
     errors = held_out(found)
@@ -258,7 +273,8 @@ def test_the_curvature_of_a_differential_vehicle_varies_between_recordings_only(
     provenance = diagnose(Campaign(Differential(right_wheel=1.03))).provenance
     assert provenance["criteria"]["varying"]["offset_per_m"] > 0.0
     varying = provenance["windows"]["varying"]
-    assert {*varying["between_recordings"]} == {"front_gain", "drive_gain", "front_offset_per_m"}
+    slow = {"front_offset_per_m", "clock_offset_s"}
+    assert {*varying["between_recordings"]} == {"front_gain", "drive_gain", *slow}
     assert {*varying["within_recordings"]} == {"front_gain", "drive_gain"}
 
 
@@ -268,7 +284,7 @@ def test_a_vehicle_that_stays_the_same_is_predicted_as_well():
     assert errors["population"] < 1.5  # mm: 0.3 mm and 0.8 mrad of a frame are in it
     assert errors["after"] == pytest.approx(errors["population"], rel=0.2)
     assert [effect.name for effect in found.effects] == ["steering_lag"]
-    for name in ("front_offset_rad", "front_gain", "drive_gain"):
+    for name in ("front_offset_rad", "front_gain", "drive_gain", "clock_offset_s"):
         value, stderr = at_end(found, name)
         assert abs(value) < 3.0 * stderr
     assert not list(sessions_in_words({"provenance": found.provenance}))

@@ -212,6 +212,28 @@ def test_slopes_by_nodes_are_those_of_whole_maps(readings):
     np.testing.assert_allclose((there - back) / 2.0, expected, atol=2e-6)
 
 
+def test_a_command_that_takes_effect_as_a_window_begins_does_not_determine_the_delay():
+    read = read_windows(free_runs(QUIET, sessions=1, runs=1, by=_switched), HORIZON, NEUTRAL_COMMAND)
+    maps = smooth_maps(read.runs, NEUTRAL_COMMAND, 9, 6)
+    predictor = Predictor(Batch(read, maps, GEOMETRY), ("actuation_delay", "cornering_speed_loss", "speed_lag"))
+    start, none = start_values_of_windows(maps, read, GEOMETRY), np.zeros((len(read), 6))
+    simulated = zip(read.simulated(), read.begins_s, strict=True)
+    delays_s = [np.min(begins_s - run.commands.t_s[run.commands.t_s < begins_s]) for run, begins_s in simulated]
+    slopes = [
+        predictor.linearise(np.r_[start, delay_s - 2e-5, 0.7, 0.7, 0.7], none).by_effects()["actuation_delay.delay_s"]
+        for delay_s in delays_s
+    ]
+    assert np.abs(slopes)[..., :2].max() < 50.0  # m/s, in a difference over 0.05 ms about 2000
+
+
+def _switched(seconds: float, rng: np.random.Generator) -> Commands:
+    """Return a constant drive with a front axle that is switched between neutral and an end, at random times."""
+    t_s = np.cumsum(rng.uniform(0.3, 1.0, round(2.0 * seconds)))
+    t_s = np.r_[0.0, t_s[t_s < seconds]]
+    ends = np.where(np.arange(len(t_s)) % 2, NEUTRAL + 350.0, NEUTRAL)
+    return Commands(t_s, np.full_like(t_s, 1150.0), ends, np.full_like(t_s, NEUTRAL))
+
+
 def test_commands_that_a_logger_repeats_are_simulated_once(readings):
     some = readings.select(np.arange(0, len(readings), 9))
     often = dataclasses.replace(some, runs=tuple(_repeated(run, 5) for run in some.runs))

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from free_drives import FREE_HEADER, calm, free_runs
+from free_drives import FREE_HEADER, calm, free_runs, stop_and_go
 from tiny_vehicle import NEUTRAL_COMMAND, Tiny
 
 from agvbench.diagnosis import Diagnosis, Verdict, diagnose
@@ -53,6 +53,17 @@ def test_a_lag_of_slow_steering_is_no_delay():
     (effect,) = diagnose(FreeCampaign(runs)).effects
     assert effect.name == "steering_lag"
     assert effect.parameters["time_constant_s"].value == pytest.approx(0.15, abs=0.01)
+
+
+def test_a_drive_of_limited_force_is_a_speed_lag_with_its_acceleration_and_coasting():
+    """One lag for accelerating, braking and coasting leaves a structure that other effects would compensate for."""
+    truth = Tiny(ramp_forward_mps2=0.25, ramp_backward_mps2=0.25, coast_s=0.3, is_ramp_of_force=True)
+    found = diagnose(FreeCampaign(free_runs(truth, runs=2, seconds=24.0, by=stop_and_go)))
+    (effect,) = found.effects
+    assert (effect.name, effect.evidence["form"]) == ("speed_lag", "speed_lag_coasting")
+    assert effect.parameters["acceleration_mps2"].value == pytest.approx(0.25, rel=0.1)
+    assert effect.parameters["coast_s"].value == pytest.approx(0.3, rel=0.1)
+    assert found.verdict is Verdict.NAMED
 
 
 def test_residuals_along_the_way_shrink_to_what_noise_leaves(lagging):

@@ -372,6 +372,10 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
         powered = second_order(speed, 0.0, drives, values["time_constant_s"], values["inertia_s"], end)
         stops, coast_s = float(drives[-1]), values["coast_s"]
         speed = lambda t: powered(t) if t < stops else powered(stops) * math.exp((stops - t) / coast_s)  # noqa: E731
+    if name == "speed_lag_motor":
+        rates = 1.0 / values["powered_s"] + values["damping_per_m"] * np.abs(SETTLED[:, 2])
+        lags = np.where(SETTLED[:, 2] == 0.0, values["coast_s"], 1.0 / rates)
+        speed = taken_up(speed, 0.0, drives, lags, end)
     if name == "speed_lag_spring_back":
         drives, _ = backlash_closes(drives, SETTLED[:, 2], values.get("backlash_m", 0.0))
         speed = sprung(aims(2, drives), share, np.union1d(drives, RUN_TIMES), values, end)

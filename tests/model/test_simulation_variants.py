@@ -55,6 +55,8 @@ SIZES = [
     ("speed_lag_inertia", {"time_constant_s": 0.5, "inertia_s": 0.1}),
     ("speed_lag_controller", {"time_constant_s": 0.12, "inertia_s": 0.2, "coast_s": 0.05}),
     ("speed_lag_controller", {"time_constant_s": 0.5, "inertia_s": 0.1, "coast_s": 0.3}),
+    ("speed_lag_motor", {"powered_s": 0.5, "damping_per_m": 6.0, "coast_s": 0.1}),
+    ("speed_lag_motor", {"powered_s": 0.15, "damping_per_m": 1.0, "coast_s": 0.4}),
     (
         "speed_lag_spring_back",
         {"forward_mps2": 0.5, "backward_mps2": 0.9, "coast_s": 0.4, "spring_per_s2": 2.5, "relaxation_s": 0.5},
@@ -130,6 +132,7 @@ def test_a_window_of_smoothed_poses_begins_as_in_a_steady_motion():
         (("speed_lag_inertia", (0.2, 0.0)), ("speed_lag", (0.2, 0.2))),
         (("speed_lag_controller", (0.2, 0.0, 0.2)), ("speed_lag", (0.2, 0.2))),
         (("speed_lag_friction", (0.2, 0.1, math.inf)), ("speed_lag", (0.2, 0.1))),
+        (("speed_lag_motor", (0.2, 0.0, 0.2)), ("speed_lag", (0.2, 0.2))),
         (("steering_rate_limit_sides", (1.2, 1.0)), ("steering_rate_limit", (1.2,))),
         (("speed_lag_inertia", (0.2, 1e-3)), ("speed_lag", (0.2, 0.2))),
         (("mocap_latency_smoothing", (0.07, 0.0)), ("mocap_latency", (0.07,))),

@@ -24,7 +24,7 @@ from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
 from agvbench.diagnosis.free_driving.drive_level import DriveLevel, drive_levels, nodal_deviation
 from agvbench.diagnosis.free_driving.maps import NODES, smooth_maps, start_values_of_windows
 from agvbench.diagnosis.free_driving.predictors import autocorrelation_time
-from agvbench.diagnosis.free_driving.selection import WindowSelector
+from agvbench.diagnosis.free_driving.selection import WindowSelector, select_drive
 from agvbench.diagnosis.method import Method
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -119,11 +119,13 @@ class FreeDriving(Method[SelectedFromWindows]):
 
     @staticmethod
     def _selected_effects(selector: WindowSelector) -> tuple[Selection, WindowSelector]:
-        """Return the effects, with delays and lags of the channels where these predict better, and their selector."""
+        """Return the effects, by channel and with variants where these predict better, and their selector."""
         selector = choose_initial_steering(selector)
         selection, selector = reconsider_initial_steering(selector.select(), selector)
         separate, selector = separate_channels(selection, selector)
-        return separate if separate is selection else selector.select(separate.chosen, ACTUATORS), selector
+        if separate is not selection:
+            selection = selector.select(separate.chosen, ACTUATORS)
+        return select_drive(selection, selector)
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromWindows) -> Diagnosis:
         """Open the test windows, and return the diagnosis."""

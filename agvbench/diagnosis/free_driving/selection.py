@@ -10,12 +10,25 @@ import numpy as np
 from agvbench.diagnosis.criteria import FREE_DRIVING, SelectionCriteria
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.diagnosis.selection.actuators import CAMERA, SERVOS_DELAY
+from agvbench.diagnosis.selection.actuators import ACTUATORS, CAMERA, SERVOS_DELAY
+from agvbench.diagnosis.selection.candidates import applies
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
-from agvbench.diagnosis.selection.stepwise import Selector
+from agvbench.diagnosis.selection.stepwise import Selection, Selector
+from agvbench.diagnosis.selection.variants import select_variants, with_extended_library
+from agvbench.effects.variants import Variant, cause_of, effect_variants
 from agvbench.types import Floats
 
 _EXTRAPOLATION_QUANTILE = 0.98
+
+LAGS = frozenset({"speed_lag", "wheel_lag"})
+_MOST_PARAMETERS = 3
+DRIVES = frozenset(
+    name
+    for name, kind in effect_variants().items()
+    if kind.variant_of in LAGS and len(kind.parameters()) <= _MOST_PARAMETERS
+)
+"""Variants of how a drive follows its command: limited acceleration, coasting, a controller that overshoots. Those with
+more parameters describe how a drive starts from rest."""
 
 
 @dataclass
@@ -24,12 +37,12 @@ class WindowSelector(Selector):
 
     ``test_batch`` holds the test windows, of which only commands and initial states are used. An effect extrapolates if
     its median change of the test windows is larger than its change of 98 % of the training windows. Such effects are
-    rejected; ``extrapolating`` names them. A delay of each channel is the only variant that is tried: a simulation with
-    every variant takes three times as long.
+    rejected; ``extrapolating`` names them. Only variants of the drive and a delay of each channel are tried: a
+    simulation with every variant takes three times as long.
     """
 
     criteria: ClassVar[SelectionCriteria] = FREE_DRIVING
-    further_kinds: ClassVar[frozenset[str] | None] = frozenset({SERVOS_DELAY})
+    further_kinds: ClassVar[frozenset[str] | None] = frozenset({SERVOS_DELAY, *DRIVES})
     test_batch: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
 
@@ -70,3 +83,27 @@ class WindowSelector(Selector):
         """Return the distance between the end positions that both models predict for each window (W,) [m]."""
         small, large = (Predictor(batch, m.fit.predictor.effects).predict(m.fit.parameters) for m in (without, with_it))
         return np.asarray(np.hypot(*(large - small)[:, -1, :2].T))
+
+
+def select_drive(selection: Selection, selector: WindowSelector) -> tuple[Selection, WindowSelector]:
+    """Return the selection with another equation of the drive, if one predicts better, and its selector.
+
+    A variant takes the place of a selected effect. Beside a selection without a lag of the drive it is added: a delay
+    of the drive resembles a limited acceleration, and leaves no gain to a lag of first order.
+    """
+    with_variants = select_variants(selection, selector, ACTUATORS, DRIVES)
+    extended = with_extended_library(selector)
+    chosen = with_variants.chosen
+    if not LAGS & {cause_of(name) for name in chosen.names}:
+        tried = (extended.with_effect(chosen, kind.name) for kind in _drives_of(extended.batch))
+        better = [model for model in tried if model.is_fitted and extended.improves(chosen, model)]
+        chosen = extended.preferred(better) if better else chosen
+    if {*chosen.names} == {*selection.chosen.names}:
+        return selection, selector
+    return extended.select(chosen, ACTUATORS), extended
+
+
+def _drives_of(batch: Batch) -> list[type[Variant]]:
+    """Return the variants of the drive that a batch simulates and that its vehicle can have."""
+    kinds = (effect_variants()[kind.name] for kind in batch.kinds if kind.name in DRIVES)
+    return [kind for kind in kinds if applies(kind, batch.geometry)]

@@ -1,4 +1,4 @@
-"""A fitted model of which steering, drive and maps have other values in each window.
+"""A fitted model of which steering, drive, clock and maps have other values in each window.
 
 Two kinds of values differ: what varies between recordings, such as the level of the drive, and nodal values of the maps
 that the training windows hardly determine.
@@ -17,15 +17,18 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.types import Floats
 
 _LEAST_SIZE = 1e-3
-_RAD, _PER_M = "rad", "per_m"
+_RAD, _PER_M, _S = "rad", "per_m", "s"
+_CLOCK = "clock"
+_STEP, _STEP_S = 1e-3, 0.02
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What may vary: the offset or the gain of a channel's static map. Gains are natural logarithms of factors.
+    """What may vary: the offset or the gain of a channel's static map, or the offset of the clock.
 
-    The offset of a steered axle is an angle. That of a differential vehicle's yaw rate is proportional to the speed,
-    as with wheels of unequal diameters: a curvature.
+    Gains are natural logarithms of factors. The offset of a steered axle is an angle. That of a differential vehicle's
+    yaw rate is proportional to the speed, as with wheels of unequal diameters: a curvature. The offset of the clock is
+    by how much later than its stamps a command is given, as in `Simulation.predict`.
     """
 
     role: str
@@ -38,8 +41,17 @@ class Quantity:
 
     @property
     def varies_within(self) -> bool:
-        """Whether it may also vary for seconds: not a curvature, since wheels keep their diameters for so long."""
-        return self.unit != _PER_M
+        """Whether it may also vary for seconds: not a curvature or a clock, since wheels and clocks do not."""
+        return self.unit not in (_PER_M, _S)
+
+    @property
+    def step(self) -> float:
+        """The step of a difference that stands for a derivative.
+
+        That of the clock is long: a command that takes effect just as a window begins changes its initial state, and
+        one such window must not seem to determine the clock.
+        """
+        return _STEP_S if self.role == _CLOCK else _STEP
 
     @property
     def name(self) -> str:
@@ -57,15 +69,20 @@ class VaryingModel:
 
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
-        """What may vary: offset and gain of each channel that steers, and the gain of the drive.
+        """What may vary: offset and gain of each channel that steers, the gain of the drive, and the clock.
 
         A channel with one command in all windows does not steer. Quantities that vary within a recording come first.
         """
         nodes = self.predictor.maps.nodes
         unit = _PER_M if self.predictor.batch.geometry.is_differential else _RAD
         steered = [role for role in ROLES if role != "drive" and len(nodes[role]) > 1]
-        found = [*(Quantity(role, of) for role in steered for of in (unit, "")), Quantity("drive")]
-        return tuple(sorted(found, key=lambda quantity: not quantity.varies_within))
+        of_maps = [*(Quantity(role, of) for role in steered for of in (unit, "")), Quantity("drive")]
+        return tuple(sorted([*of_maps, Quantity(_CLOCK, _S)], key=lambda quantity: not quantity.varies_within))
+
+    @cached_property
+    def steps(self) -> Floats:
+        """The steps (m + r,) of differences by the quantities and by the map components."""
+        return np.array([*(quantity.step for quantity in self.quantities), *[_STEP] * len(self.map_components)])
 
     @cached_property
     def map_components(self) -> Floats:
@@ -93,19 +110,27 @@ class VaryingModel:
         batch, quantities = self.predictor.batch, self.quantities
         settled, initial = self.predictor.settled(self.parameters)
         self._add_components(settled, values[:, len(quantities) :])
-        of_row = values[batch.base.row_runs]
+        later_s = np.zeros(len(values))
         for k, quantity in enumerate(quantities):
-            column = ROLES.index(quantity.role)
-            if quantity.is_gain:
-                settled[:, column] *= np.exp(of_row[:, k])
+            if quantity.role == _CLOCK:
+                later_s += values[:, k]
             else:
-                by_speed = settled[:, ROLES.index("drive")] if batch.geometry.is_differential else 1.0
-                settled[:, column] += of_row[:, k] * by_speed
-            if quantity.role != "drive":
-                settled[:, column] = np.clip(settled[:, column], *self.predictor.steering_limits)
+                self._change(settled, quantity, values[batch.base.row_runs, k])
         parameters, deviation = self.predictor.all_parameters(self.parameters), batch.nodal_deviation
-        poses = batch.base.predict(settled, parameters, initial, nodal_deviation=deviation)
+        poses = batch.base.predict(settled, parameters, initial, nodal_deviation=deviation, later_s=later_s)
         return poses.reshape(len(values), -1, 3)
+
+    def _change(self, settled: Floats, quantity: Quantity, of_row: Floats) -> None:
+        """Change angles and speeds of every row (rows, 3) by the value `of_row` (rows,) of a quantity of a map."""
+        column = ROLES.index(quantity.role)
+        if quantity.is_gain:
+            settled[:, column] *= np.exp(of_row)
+        elif quantity.unit == _PER_M:
+            settled[:, column] += of_row * settled[:, ROLES.index("drive")]
+        else:
+            settled[:, column] += of_row
+        if quantity.role != "drive":
+            settled[:, column] = np.clip(settled[:, column], *self.predictor.steering_limits)
 
     def _add_components(self, settled: Floats, values: Floats) -> None:
         """Add what the map components with `values` (W, r) change in every row (rows, 3)."""

@@ -1,8 +1,9 @@
-"""Parameters that differ between recordings and drift: steering offset and gain, and the level of the drive.
+"""Parameters that differ between recordings and drift: steering offset and gain, level of the drive, and clock.
 
-A battery is charged, a linkage is knocked, another floor is driven on. The model of the selected effects has one value
-of each for all recordings. A recording's own value is estimated from the residuals of the windows that ended before a
-prediction begins. So are the nodal values of maps at commands that the training windows hardly have.
+A battery is charged, a linkage is knocked, another floor is driven on, the clocks of camera and vehicle differ. The
+model of the selected effects has one value of each for all recordings. A recording's own value is estimated from the
+residuals of the windows that ended before a prediction begins. So are the nodal values of maps at commands that the
+training windows hardly have.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from agvbench.types import Floats
 _OWN_SCALES = 3
 _LEAST_VARIANCE = 1e-12
 _WIDE = 2.0
-_TYPICAL = {"rad": VARYING.offset_rad, "per_m": VARYING.offset_per_m, "": VARYING.gain}
+_TYPICAL = {"rad": VARYING.offset_rad, "per_m": VARYING.offset_per_m, "s": VARYING.offset_s, "": VARYING.gain}
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from agvbench.diagnosis.free_driving.varying_model import VaryingModel
 from agvbench.types import Floats
 
 _SAMPLE = REPORTED_SAMPLES[0]
-_STEP = 1e-3
+_SHORTEST_S = 1e-3
 _LEAST_M = 0.02
 _UNCERTAIN_S = 1.0
 _TIME_CONSTANTS = 4.0
@@ -75,9 +75,8 @@ class WindowResiduals:
 def _slopes(model: VaryingModel) -> Floats:
     """Return the derivatives (W, 3, m + r) of poses by what differs between recordings."""
     poses = model.as_fitted[:, _SAMPLE]
-    steps = _STEP * np.eye(len(model.quantities) + len(model.map_components))
-    changes = [model.poses(np.tile(step, (len(poses), 1)))[:, _SAMPLE] - poses for step in steps]
-    return np.stack([_turned(change, poses[:, 2]) / _STEP for change in changes], axis=-1)
+    changes = [model.poses(np.tile(step, (len(poses), 1)))[:, _SAMPLE] - poses for step in np.diag(model.steps)]
+    return np.stack([_turned(change, poses[:, 2]) for change in changes], axis=-1) / model.steps
 
 
 def _turned(changes: Floats, heading: Floats) -> Floats:
@@ -102,7 +101,7 @@ def _scale(readings: Readings, poses: Floats, interval_s: Floats, begun: Floats)
     much of the actuators' state comes from the time before the run, of which no commands are known.
     """
     motion = np.concatenate([readings.start[:, None], poses[:, : _SAMPLE + 1]], axis=1)
-    interval_s = np.maximum(interval_s[:, : _SAMPLE + 1], _STEP)
+    interval_s = np.maximum(interval_s[:, : _SAMPLE + 1], _SHORTEST_S)
     yaw_rate = np.diff(motion[..., 2], axis=1) / interval_s
     speed = np.linalg.norm(np.diff(motion[..., :2], axis=1), axis=-1) / interval_s
     by_yaw_rate, by_speed = (np.ptp(np.nan_to_num(rates), axis=1) for rates in (yaw_rate, speed))

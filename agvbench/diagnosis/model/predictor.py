@@ -13,6 +13,7 @@ from agvbench.diagnosis.model.nodal_maps import ROLES
 from agvbench.diagnosis.model.physical_priors import PhysicalPriors
 from agvbench.diagnosis.model.repeats import Repeats
 from agvbench.diagnosis.model.smoothness import PriorTerms
+from agvbench.effects.base import Stage
 from agvbench.types import Floats
 
 
@@ -62,6 +63,9 @@ RANDOM_EFFECTS = ("x_m", "y_m", "heading_rad", "front_rad", "rear_rad", "log_spe
 
 _STEP = 1e-4  # rad, m/s
 _STEP_SHARE = 1e-3
+# A command that takes effect just as a window begins changes its initial state. With a short step, one such window
+# would seem to determine a delay to microseconds.
+_STEP_OF_DELAYS_S = 5e-3
 MAX_ANGLE_RAD, MAX_YAW_RATE = 1.4, 30.0
 """Limits of the values of steering maps; what a fit puts beyond them counts as the limit."""
 
@@ -79,10 +83,14 @@ class Predictor:
         self.parameter_names: list[str] = [batch.base.parameter_names[i] for i in self._own]
         self.nulls: Floats = batch.base.nulls[self._own]
         self.physical = PhysicalPriors.of(self.readings.priors, effects, self.parameter_names, self.nulls)
-        self._steps = _STEP_SHARE * batch.base.scales[self._own]
         own = [kind for kind in batch.base.kinds if kind.name in effects]
         alike = {kind.name for kind in own if kind.acts_alike_on_repeats()}
         kinds = [name.partition(".")[0] for name in self.parameter_names]
+        self._steps = _STEP_SHARE * batch.base.scales[self._own]
+        if self.readings.initial_states is not None:
+            late = [kind for kind in own if kind.stage == Stage.TRANSPORT]
+            delays = {f"{kind.name}.{p.name}" for kind in late for p in kind.parameters() if p.unit == "s"}
+            self._steps[[name in delays for name in self.parameter_names]] = _STEP_OF_DELAYS_S
         self._acts_alike = np.array([kind in alike for kind in kinds], dtype=np.bool_)
         discrete = {f"{kind.name}.{p.name}" for kind in own for p in kind.parameters() if p.is_discrete}
         self._is_discrete = np.array([name in discrete for name in self.parameter_names], dtype=np.bool_)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -75,18 +75,24 @@ class _Replacement:
     starts: Floats
 
 
-def select_variants(selection: Selection, selector: Selector) -> Selection:
+def select_variants(
+    selection: Selection, selector: Selector, group: Collection[str] = (), among: Collection[str] | None = None
+) -> Selection:
     """Return the selection with variants in place of effects of the library, where they predict better.
 
     An effect that only compensated for the wrong equation is removed. Models contain the names of variants; a diagnosis
-    reports the effect that a variant belongs to.
+    reports the effect that a variant belongs to. Effects with a cause in `group` are judged as in
+    `Selector.backward_elimination`. Variants `among` these names are tried, all by default.
     """
     effects = [name for name in selection.chosen.names if name not in selector.given]
     if not effects:
         return selection
     extended, current = with_extended_library(selector), selection.chosen
     replacements = [
-        replacement for name in effects for replacement in _replacements(selection, selector, extended, name)
+        replacement
+        for name in effects
+        for replacement in _replacements(selection, selector, extended, name)
+        if among is None or replacement.variant.name in among
     ]
     tried: list[tuple[_Replacement, ScoredModel]] = []
     for name in effects:
@@ -98,7 +104,7 @@ def select_variants(selection: Selection, selector: Selector) -> Selection:
         )
     if current.names == selection.chosen.names:
         return selection
-    current, gains = extended.backward_elimination(selection.base, current)
+    current, gains = extended.backward_elimination(selection.base, current, group)
     gain = selection.chosen.deviance - current.deviance
     known = {name: selection.alternatives.get(cause_of(name), {}) for name in gains}
     alternatives = {name: _after_gain(known[name], gain) | _other_causes(current, name, tried) for name in gains}
@@ -199,7 +205,8 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
     chosen_gains = without.deviance - chosen.deviance, chosen.fit_gain_over(without)
     others = [other for other in selector.candidates if other not in chosen.names]
     models = {name: chosen} | selector.likely(without, chosen, others)
-    for variant in effect_variants().values():
+    simulated = (kind for kind in effect_variants().values() if kind in extended.batch.kinds)
+    for variant in simulated:
         if not applies(variant, selector.batch.geometry) or variant.variant_of not in {name, *others}:
             continue
         kind = candidate(variant)

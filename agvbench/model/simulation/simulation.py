@@ -197,6 +197,7 @@ class Simulation:
         runs: ArrayLike | None = None,
         out: Floats | None = None,
         nodal_deviation: float = np.inf,
+        later_s: Floats | None = None,
     ) -> Floats:
         """Return the predicted poses of every frame.
 
@@ -221,6 +222,8 @@ class Simulation:
             Standard deviation of the logarithm of the recent speed over the speed that the commands before it result
             in. Beyond it, the drive is assumed to run at another level (battery, floor, temperature): every speed that
             is commanded then differs by the same amount. By default it never does.
+        later_s
+            (runs,): by how much later than its stamps each run's commands are given [s]; 0 by default.
 
         Returns
         -------
@@ -255,7 +258,7 @@ class Simulation:
             self._logged,
             self._from_neutral,
             np.ascontiguousarray(settled, dtype=np.float64),
-            self._command_t_s,
+            self._command_t_s if later_s is None else self._command_t_s + later_s[self.row_runs],
             self.row_starts,
             self.t_s,
             self.frame_starts,
