@@ -11,7 +11,7 @@ from agvbench.diagnosis.criteria import FREE_DRIVING, SelectionCriteria
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.actuators import ACTUATORS, CAMERA, SERVOS_DELAY
-from agvbench.diagnosis.selection.candidates import applies
+from agvbench.diagnosis.selection.candidates import applies, default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
 from agvbench.diagnosis.selection.variants import select_variants, with_extended_library
@@ -100,6 +100,7 @@ def select_drive(selection: Selection, selector: WindowSelector) -> tuple[Select
         chosen = extended.preferred(better) if better else chosen
     if {*chosen.names} == {*selection.chosen.names}:
         return selection, selector
+    extended.candidates |= {name: default_candidate(name) for name in chosen.names if name in DRIVES}
     return extended.select(chosen, ACTUATORS), extended
 
 

@@ -210,7 +210,7 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
         if not applies(variant, selector.batch.geometry) or variant.variant_of not in {name, *others}:
             continue
         kind = candidate(variant)
-        if (model := models.get(variant.variant_of)) is not None:
+        if (model := models.get(variant.variant_of)) is not None and model.is_fitted:
             # A strong effect with the wrong equation fits well and predicts badly.
             gains = without.deviance - model.deviance, model.fit_gain_over(without)
             if any(own >= VARIANT.min_gain_share * gain for own, gain in zip(gains, chosen_gains, strict=True)):
