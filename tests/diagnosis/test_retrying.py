@@ -45,7 +45,7 @@ def test_what_another_causes_law_replaced_may_be_tried_again(selector, monkeypat
     lag = selector.with_effect(base, "steering_lag")
     monkeypatch.setattr(forms, "_replacements", lambda *_: iter(()))
     monkeypatch.setattr(forms, "_best_replacement", lambda _extended, current, _models: replace(current, names=(law,)))
-    monkeypatch.setattr(Selector, "backward_elimination", lambda _self, _base, current: (current, {law: 100.0}))
+    monkeypatch.setattr(Selector, "backward_elimination", lambda _self, _base, current, _group: (current, {law: 100.0}))
     reformed = forms.select_variants(Selection(base, lag, {}, {"steering_lag": 500.0}, {}, 2), selector)
     assert reformed.chosen.names == (law,)
     assert reformed.rejected == again

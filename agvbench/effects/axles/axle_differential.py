@@ -31,7 +31,7 @@ class AxleDifferential(Effect):
     needs_steered_axles: ClassVar[bool] = True
     needs_both_axles_driven: ClassVar[bool] = True
 
-    share: float = parameter(unit="–", low=0.0, high=2.0, scale=0.5)
+    share: float = parameter(unit="–", low=0.0, high=1.5, scale=0.5)
 
     @staticmethod
     def move(state: Floats, share: float) -> None:
