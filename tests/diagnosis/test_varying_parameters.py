@@ -151,8 +151,8 @@ class Recordings:
 
     In it the vehicle is steered beside what is recorded, by `steering_us`, and drives `faster`. If the drive is
     `held`, each recording has one drive command, which no other one has. In the morning the axles are steered by the
-    share `reach` of what they are in the evening. The front axle has an end stop, `limit_us` from neutral. Commands are
-    given `later_s` than the logger says in the evening.
+    share `reach` of what they are in the evening. The front axle has an end stop, `limit_us` from neutral. In the
+    evening commands are given later than the logger says, by `later_s`.
     """
 
     header = FREE_HEADER

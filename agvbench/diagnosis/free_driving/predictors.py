@@ -14,7 +14,7 @@ from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.effects import Effect
 from agvbench.model import VehicleModel
-from agvbench.model.simulation.simulation import SimulatedRun, Simulation
+from agvbench.model.simulation.simulation import Simulation
 from agvbench.types import Floats
 from agvbench.vehicle.kinematics import wheel_speed
 
@@ -57,11 +57,7 @@ def change_by_speed_error(predictor: Predictor, parameters: Floats) -> Floats:
 def prior_model(vehicle: VehicleModel, readings: Readings, kinds: Sequence[type[Effect]]) -> Floats:
     """Return poses (W, K, 3) that a vehicle model predicts; `kinds` are effects outside the library."""
     initial_states = _initial_states(readings)
-    runs = [
-        SimulatedRun(run.commands, t, float(h), begins_s=float(b))
-        for run, t, h, b in zip(readings.runs, readings.t_s, readings.started_h, initial_states.t_s, strict=True)
-    ]
-    simulation = Simulation(vehicle.geometry, vehicle.neutral, runs, kinds=kinds)
+    simulation = Simulation(vehicle.geometry, vehicle.neutral, readings.simulated(), kinds=kinds)
     settled = simulation.settled(vehicle.front, vehicle.rear, vehicle.drive)
     initial = np.column_stack([readings.start, initial_states.speed_mps])
     poses = simulation.predict(settled, simulation.parameters([e for e in vehicle.effects if not e.is_null]), initial)

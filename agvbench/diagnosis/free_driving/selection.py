@@ -11,11 +11,15 @@ from agvbench.diagnosis.criteria import FREE_DRIVING, SelectionCriteria
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.actuators import ACTUATORS, CAMERA, SERVOS_DELAY
-from agvbench.diagnosis.selection.candidates import applies, default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.variants import select_variants, with_extended_library
-from agvbench.effects.variants import Variant, cause_of, effect_variants
+from agvbench.diagnosis.selection.variants import (
+    add_variants,
+    select_variants,
+    simulated_variants,
+    with_extended_library,
+)
+from agvbench.effects.variants import cause_of, effect_variants
 from agvbench.types import Floats
 
 _EXTRAPOLATION_QUANTILE = 0.98
@@ -95,16 +99,11 @@ def select_drive(selection: Selection, selector: WindowSelector) -> tuple[Select
     extended = with_extended_library(selector)
     chosen = with_variants.chosen
     if not LAGS & {cause_of(name) for name in chosen.names}:
-        tried = (extended.with_effect(chosen, kind.name) for kind in _drives_of(extended.batch))
+        drives = (kind.name for kind in simulated_variants(extended.batch) if kind.name in DRIVES)
+        tried = (extended.with_effect(chosen, name) for name in drives)
         better = [model for model in tried if model.is_fitted and extended.improves(chosen, model)]
         chosen = extended.preferred(better) if better else chosen
     if {*chosen.names} == {*selection.chosen.names}:
         return selection, selector
-    extended.candidates |= {name: default_candidate(name) for name in chosen.names if name in DRIVES}
+    add_variants(extended, chosen.names)
     return extended.select(chosen, ACTUATORS), extended
-
-
-def _drives_of(batch: Batch) -> list[type[Variant]]:
-    """Return the variants of the drive that a batch simulates and that its vehicle can have."""
-    kinds = (effect_variants()[kind.name] for kind in batch.kinds if kind.name in DRIVES)
-    return [kind for kind in kinds if applies(kind, batch.geometry)]

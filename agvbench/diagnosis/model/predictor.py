@@ -85,15 +85,14 @@ class Predictor:
         self.physical = PhysicalPriors.of(self.readings.priors, effects, self.parameter_names, self.nulls)
         own = [kind for kind in batch.base.kinds if kind.name in effects]
         alike = {kind.name for kind in own if kind.acts_alike_on_repeats()}
-        kinds = [name.partition(".")[0] for name in self.parameter_names]
+        declared = {f"{kind.name}.{p.name}": (kind, p) for kind in own for p in kind.parameters()}
+        parameters = [declared[name] for name in self.parameter_names]
+        self._acts_alike = np.array([kind.name in alike for kind, _ in parameters], dtype=np.bool_)
+        self._is_discrete = np.array([p.is_discrete for _, p in parameters], dtype=np.bool_)
         self._steps = _STEP_SHARE * batch.base.scales[self._own]
         if self.readings.initial_states is not None:
-            late = [kind for kind in own if kind.stage == Stage.TRANSPORT]
-            delays = {f"{kind.name}.{p.name}" for kind in late for p in kind.parameters() if p.unit == "s"}
-            self._steps[[name in delays for name in self.parameter_names]] = _STEP_OF_DELAYS_S
-        self._acts_alike = np.array([kind in alike for kind in kinds], dtype=np.bool_)
-        discrete = {f"{kind.name}.{p.name}" for kind in own for p in kind.parameters() if p.is_discrete}
-        self._is_discrete = np.array([name in discrete for name in self.parameter_names], dtype=np.bool_)
+            is_delay = [kind.stage == Stage.TRANSPORT and p.unit == "s" for kind, p in parameters]
+            self._steps[np.array(is_delay, dtype=np.bool_)] = _STEP_OF_DELAYS_S
         self._last: tuple[tuple[bytes, ...], Floats] = (), np.empty(0)
 
     @property

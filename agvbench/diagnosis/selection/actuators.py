@@ -17,7 +17,7 @@ from agvbench.diagnosis.criteria import DISCREPANCY, SELECTION
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.lack_of_fit import has_structure
 from agvbench.diagnosis.selection.stepwise import AnySelector, Selection, Selector
-from agvbench.diagnosis.selection.variants import variant_candidates, with_extended_library
+from agvbench.diagnosis.selection.variants import add_variants, variant_candidates, with_extended_library
 from agvbench.effects.variants import cause_of
 
 CAMERA, DELAY = "mocap_latency", "actuation_delay"
@@ -202,7 +202,7 @@ def _replaced(
     if gain > 0.0:
         selector.on_progress(f"{' + '.join(current.names)}: lag and delay separately gain {gain:.0f}")
     causes = {cause_of(name) for name in current.names}
-    selector.candidates |= {n: c for n, c in variant_candidates().items() if n in current.names}
+    add_variants(selector, current.names)
     return replace(
         selection,
         chosen=current,
@@ -249,7 +249,7 @@ def prefer_actuators(selection: Selection, selector: Selector) -> Selection:
     for name in gains:
         if difference > -margin and name not in chosen.names and cause_of(name) in ACTUATORS:
             alternatives[name][CAMERA] = -difference
-    selector.candidates |= {n: c for n, c in variant_candidates().items() if n in current.names}
+    add_variants(selector, current.names)
     rejected = {name: gain for name, gain in selection.rejected.items() if name not in causes}
     return replace(
         selection,

@@ -16,10 +16,10 @@ from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.levenberg_marquardt import FitState, LevenbergMarquardt
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.actuators import CAMERA, DELAY
-from agvbench.diagnosis.selection.candidates import applies, bounds_of
+from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.variants import with_extended_library
+from agvbench.diagnosis.selection.variants import simulated_variants, with_extended_library
 from agvbench.effects.variants import cause_of, causes_in, effect_variants
 
 _STANDARD_ERRORS = 3.0
@@ -77,11 +77,9 @@ def _lengths_but_for_markers(extended: Selector, selection: Selection, name: str
 def _combining_variants(extended: Selector, alternatives: Mapping[str, float]) -> list[str]:
     """Return the variants that combine one of the `alternatives` with another effect."""
     return [
-        name
-        for name, variant in effect_variants().items()
-        if variant.variant_of in alternatives
-        and len(causes_in(variant)) > 1
-        and applies(variant, extended.batch.geometry)
+        variant.name
+        for variant in simulated_variants(extended.batch)
+        if variant.variant_of in alternatives and len(causes_in(variant)) > 1
     ]
 
 

@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.diagnosis.criteria import FIT
-from agvbench.diagnosis.selection.candidates import applies, candidate
+from agvbench.diagnosis.selection.candidates import candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection, Selector
-from agvbench.diagnosis.selection.variants import select_further, starts_near, with_extended_library
-from agvbench.effects.variants import cause_of, effect_variants
+from agvbench.diagnosis.selection.variants import select_further, simulated_variants, starts_near, with_extended_library
+from agvbench.effects.variants import cause_of
 
 
 def with_refused_effects(selection: Selection, selector: Selector) -> Selection:
@@ -53,8 +53,8 @@ def _refused(current: ScoredModel, selector: Selector) -> Iterator[ScoredModel]:
 def _with_variants(extended: Selector, current: ScoredModel, refused: ScoredModel) -> Iterator[ScoredModel]:
     """Yield `current` with each variant of the last effect of a model, fitted from near the library's equation."""
     (name,) = {*refused.names} - {*current.names}
-    for variant in effect_variants().values():
-        if variant.variant_of == name and applies(variant, extended.batch.geometry):
+    for variant in simulated_variants(extended.batch):
+        if variant.variant_of == name:
             near = replace(candidate(variant), starts=starts_near(variant, refused))
             with suppress(np.linalg.LinAlgError):  # the fit diverged
                 model = extended.with_effect(current, variant.name, near)

@@ -13,11 +13,11 @@ import numpy as np
 
 from agvbench.diagnosis.criteria import SELECTION, VARIANT
 from agvbench.diagnosis.selection.actuators import CAMERA
-from agvbench.diagnosis.selection.candidates import applies, default_candidate
+from agvbench.diagnosis.selection.candidates import default_candidate
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import ExcludedAlternative, Selection, Selector
-from agvbench.diagnosis.selection.variants import substituted, variant_candidates, with_extended_library
-from agvbench.effects.variants import cause_of, causes_in, effect_variants
+from agvbench.diagnosis.selection.variants import add_variants, simulated_variants, substituted, with_extended_library
+from agvbench.effects.variants import cause_of, causes_in
 
 _MAX_ROUNDS = 3
 
@@ -48,7 +48,7 @@ def replace_sequentially(selection: Selection, selector: Selector) -> Selection:
     current, gains = _with_library_equations(extended, selection.base, current, gains)
     by_cause = {cause_of(name): differences for name, differences in alternatives.items()}
     alternatives = {name: by_cause.get(cause_of(name), {}) for name in gains}
-    selector.candidates |= {name: one for name, one in variant_candidates().items() if name in current.names}
+    add_variants(selector, current.names)
     rejected = {name: gain for name, gain in selection.rejected.items() if name not in current.names}
     tried = selector.models_fitted
     return replace(selection, chosen=current, gains=gains, alternatives=alternatives, rejected=rejected, tried=tried)
@@ -128,14 +128,9 @@ def _in_place_of(extended: Selector, base: ScoredModel, current: ScoredModel, na
     without = extended.without_effect(base, current, name)
     causes = {cause_of(present) for present in current.names}
     gain = current.fit_gain_over(without)
-    geometry = extended.batch.geometry
     predicted = {other: extended.predicted_gain(without, other) for other in extended.further(current)}
     near = {cause_of(other) for other, own in predicted.items() if own >= SELECTION.likely_share * gain}
-    variants = [
-        v
-        for v in effect_variants().values()
-        if v.variant_of not in causes and causes_in(v) & near and applies(v, geometry)
-    ]
+    variants = [v for v in simulated_variants(extended.batch) if v.variant_of not in causes and causes_in(v) & near]
     predicted |= {v.name: extended.predicted_gain(without, v.name) for v in variants}
     likely = VARIANT.min_gain_share * gain
     models = {other: extended.with_effect(without, other) for other in sorted(predicted) if predicted[other] >= likely}

@@ -12,6 +12,7 @@ import numpy as np
 from agvbench.diagnosis.criteria import FIT, SELECTION, VARIANT
 from agvbench.diagnosis.estimation.fit import fit
 from agvbench.diagnosis.estimation.score_test import first_order_gain
+from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, applies, bounds_of, candidate, candidates
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
@@ -36,6 +37,16 @@ Hooks are called in this order: terms change what variants set, such as lags.
 def variant_candidates() -> dict[str, Candidate]:
     """Return the candidates of all variants, by name."""
     return {name: candidate(variant) for name, variant in effect_variants().items()}
+
+
+def add_variants(selector: Selector, names: Collection[str]) -> None:
+    """Add the variants among the `names` of effects to the candidates of a selector."""
+    selector.candidates |= {name: one for name, one in variant_candidates().items() if name in names}
+
+
+def simulated_variants(batch: Batch) -> list[type[Variant]]:
+    """Return the variants that a batch simulates and that its vehicle can have."""
+    return [v for v in effect_variants().values() if v in batch.kinds and applies(v, batch.geometry)]
 
 
 def candidates_for(
@@ -88,12 +99,8 @@ def select_variants(
     if not effects:
         return selection
     extended, current = with_extended_library(selector), selection.chosen
-    replacements = [
-        replacement
-        for name in effects
-        for replacement in _replacements(selection, selector, extended, name)
-        if among is None or replacement.variant.name in among
-    ]
+    kinds = [kind for kind in simulated_variants(extended.batch) if among is None or kind.name in among]
+    replacements = [one for name in effects for one in _replacements(selection, selector, extended, name, kinds)]
     tried: list[tuple[_Replacement, ScoredModel]] = []
     for name in effects:
         if name in current.names:
@@ -111,7 +118,7 @@ def select_variants(
     # An effect that a variant of another has replaced may be right beside a later discrepancy term.
     causes = {cause_of(n) for n in current.names}
     rejected = {n: g for n, g in (selection.rejected | selection.gains).items() if n not in causes}
-    selector.candidates |= {n: c for n, c in variant_candidates().items() if n in current.names}
+    add_variants(selector, current.names)
     return Selection(selection.base, current, alternatives, gains, rejected, selector.models_fitted)
 
 
@@ -131,7 +138,7 @@ def continued(selection: Selection, before: Selection, selector: Selector) -> Se
 def select_further(selection: Selection, begun: ScoredModel, selector: Selector) -> Selection:
     """Return the selection continued from a model that was `begun`, with further effects and variants."""
     extended = with_extended_library(selector)
-    extended.candidates |= {n: c for n, c in variant_candidates().items() if n in begun.names}
+    add_variants(extended, begun.names)
     again = extended.select(begun, map(cause_of, begun.names))
     again = select_variants(replace(again, base=selection.base), extended)
     selector.candidates |= {n: c for n, c in extended.candidates.items() if n in again.chosen.names}
@@ -195,8 +202,10 @@ def starts_near(variant: type[Variant], model: ScoredModel) -> Floats:
     return starts
 
 
-def _replacements(selection: Selection, selector: Selector, extended: Selector, name: str) -> Iterator[_Replacement]:
-    """Yield variants of the effect `name`, and of other effects with at least half its gain in its place.
+def _replacements(
+    selection: Selection, selector: Selector, extended: Selector, name: str, kinds: Collection[type[Variant]]
+) -> Iterator[_Replacement]:
+    """Yield those `kinds` of variants of the effect `name`, and of others with at least half its gain in its place.
 
     The gain may be cross-validated, of the fit, or predicted.
     """
@@ -205,9 +214,8 @@ def _replacements(selection: Selection, selector: Selector, extended: Selector, 
     chosen_gains = without.deviance - chosen.deviance, chosen.fit_gain_over(without)
     others = [other for other in selector.candidates if other not in chosen.names]
     models = {name: chosen} | selector.likely(without, chosen, others)
-    simulated = (kind for kind in effect_variants().values() if kind in extended.batch.kinds)
-    for variant in simulated:
-        if not applies(variant, selector.batch.geometry) or variant.variant_of not in {name, *others}:
+    for variant in kinds:
+        if variant.variant_of not in {name, *others}:
             continue
         kind = candidate(variant)
         if (model := models.get(variant.variant_of)) is not None and model.is_fitted:
