@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import pytest
-from free_drives import free_runs, stop_and_go
+from free_drives import FREE_HEADER, free_runs, stop_and_go
 from tiny_vehicle import HEADER, NEUTRAL_COMMAND, Tiny
 
+from agvbench.diagnosis import diagnose
 from agvbench.diagnosis.data.readings import read_windows
 from agvbench.diagnosis.data.windows import Horizon
+from agvbench.diagnosis.design.alternatives import equation_of, swapped
 from agvbench.diagnosis.free_driving.method import static_maps
 from agvbench.diagnosis.free_driving.selection import DRIVES, WindowSelector, select_drive
 from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.variants import candidates_for
 from agvbench.effects.variants import effect_variants
@@ -59,3 +62,20 @@ def test_the_equations_are_of_the_speed_and_have_few_parameters():
     assert {"speed_lag_ramp", "speed_lag_coasting", "speed_lag_motor", "wheel_lag_inertia"} < DRIVES
     assert "speed_lag_spring_back" not in DRIVES
     assert all(len(effect_variants()[name].parameters()) <= 3 for name in DRIVES)
+
+
+def test_what_is_not_identified_is_said_for_a_model_with_another_equation_of_the_drive():
+    runs = free_runs(TRUTH, sessions=3, runs=1, by=stop_and_go)
+    found = diagnose(type("Drives", (), {"header": FREE_HEADER, "__iter__": lambda _: iter(runs)})())
+    assert [(effect.name, effect.evidence["form"]) for effect in found.effects] == [("speed_lag", "speed_lag_coasting")]
+    assert set(found.provenance["not_identifiable"]) == {"reverse_steering_gain.gain"}
+
+
+def test_an_alternative_has_another_equation_where_that_of_the_library_predicts_worse(selector):
+    base = selector.base()
+    nothing = Selection(base, base, {}, {}, {}, 0)
+    chosen = select_drive(nothing, selector)[0].chosen.fit
+    assert equation_of(chosen, "speed_lag") == "speed_lag_coasting"
+    other = swapped(chosen, "speed_lag", "speed_lag", candidates(chosen.predictor.batch.geometry))
+    assert other.predictor.effects == ("speed_lag_coasting",)
+    assert other.total_loss == pytest.approx(chosen.total_loss, abs=1.0)

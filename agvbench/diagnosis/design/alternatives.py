@@ -9,9 +9,12 @@ from itertools import combinations
 
 import numpy as np
 
+from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.model.predictor import Predictor
-from agvbench.diagnosis.selection.candidates import Candidate, bounds_of
+from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, candidate
+from agvbench.diagnosis.selection.variants import simulated_variants
+from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
 _FEW_ITERATIONS, _MANY_ITERATIONS = 2, 8
@@ -20,7 +23,7 @@ _MAX_PAIRS = 3
 
 @dataclass(frozen=True)
 class Alternative:
-    """A fitted model with the effect ``name`` in the place of ``instead_of``."""
+    """A fitted model with the effect ``name`` in the place of ``instead_of``, each in any of its equations."""
 
     name: str
     instead_of: str
@@ -54,12 +57,24 @@ def alternative_models(
 def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candidate]) -> Fit | None:
     """Return the model with the effect `other` in the place of `name`, fitted from the best of its starts.
 
-    None if the fits diverge from all of them.
+    Of `other` it has the library's equation. If that does not predict as well, it has the best of the equations that
+    the model simulates. None if the fits diverge from all starts.
     """
-    names = (*(n for n in chosen.predictor.effects if n != name), other)
+    found = _with_equation(chosen, name, candidates[other])
+    if found is not None and found.total_loss < chosen.total_loss + SELECTION.alternative_margin:
+        return found
+    variants = [kind for kind in simulated_variants(chosen.predictor.batch) if kind.variant_of == other]
+    fits = [found, *(_with_equation(chosen, name, candidate(kind)) for kind in variants)]
+    return min((own for own in fits if own is not None), key=lambda own: own.total_loss, default=None)
+
+
+def _with_equation(chosen: Fit, name: str, equation: Candidate) -> Fit | None:
+    """Return the model with an `equation` in the place of that of the effect `name`; None if the fits diverge."""
+    replaced = equation_of(chosen, name)
+    names = (*(n for n in chosen.predictor.effects if n != replaced), equation.name)
     predictor = Predictor(chosen.predictor.batch, names)
     bounds = bounds_of(names)
-    kept = [value for key, value in chosen.effect_values().items() if key.partition(".")[0] != name]
+    kept = [value for key, value in chosen.effect_values().items() if key.partition(".")[0] != replaced]
     maps = chosen.parameters[: chosen.predictor.maps.size]
 
     def fitted(parameters: Floats, near: Fit, iterations: int) -> Fit:
@@ -73,7 +88,7 @@ def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candida
         )
 
     found = []
-    for start in candidates[other].starts:
+    for start in equation.starts:
         with suppress(np.linalg.LinAlgError):
             found.append(fitted(np.r_[maps, kept, start], chosen, _FEW_ITERATIONS))
     if not found:
@@ -83,3 +98,14 @@ def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candida
         return fitted(best.parameters, best, _MANY_ITERATIONS)
     except np.linalg.LinAlgError:
         return best
+
+
+def equation_of(fitted: Fit, name: str) -> str:
+    """Return which of a model's effects is the effect `name` of the library, or a variant of it.
+
+    Raises
+    ------
+    KeyError
+        If the model has no such effect.
+    """
+    return {cause_of(own): own for own in fitted.predictor.effects}[name]

@@ -12,6 +12,7 @@ from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate
 from agvbench.effects import effect_kinds
+from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
 _WEAK = 1e-6
@@ -53,11 +54,11 @@ def unidentified(chosen: Fit, candidates: Mapping[str, Candidate]) -> list[Unide
     own = weighted.columns(chosen.linear.by_parameters)
     known = chosen.information.total
     inverse = np.linalg.inv(known + _WEAK * np.eye(len(known)))
-    kinds = effect_kinds()
+    kinds, selected = effect_kinds(), {cause_of(name) for name in chosen.predictor.effects}
     found = []
     for name, candidate in candidates.items():
         parameters = kinds[name].parameters()
-        if name in chosen.predictor.effects or not np.isfinite([p.null for p in parameters]).all():
+        if name in selected or not np.isfinite([p.null for p in parameters]).all():
             continue
         # A direction has no effect near the null value of the drift.
         at_size = [0.0 if p.is_direction else p.scale for p in parameters]

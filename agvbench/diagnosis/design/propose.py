@@ -15,7 +15,6 @@ from agvbench.diagnosis.proposal import NextExperiment
 from agvbench.diagnosis.result import Diagnosis, Verdict
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.diagnosis.selection.stepwise import Selection
-from agvbench.effects.variants import effect_variants
 from agvbench.errors import AgvbenchError
 from agvbench.planning import Trajectory, Workspace
 from agvbench.planning.trajectories.shapes import Slalom
@@ -28,12 +27,9 @@ def with_next_experiment(
     """Return `found` with the run that discriminates alternatives or, without any, identifies parameters.
 
     ``provenance["inseparable"]`` lists the pairs that no run can discriminate, with the required measurement;
-    ``provenance["not_identifiable"]`` the parameters that these data do not identify. For a model with variants nothing
-    is proposed: an alternative is an effect of the library in the place of another.
+    ``provenance["not_identifiable"]`` the parameters that these data do not identify.
     """
     chosen = selection.chosen.fit
-    if effect_variants().keys() & set(chosen.predictor.effects):
-        return found
     tried = candidates(chosen.predictor.batch.geometry)
     workspace = covered_workspace(readings, chosen.predictor.batch.geometry)
     unit = header.channels.table_unit
