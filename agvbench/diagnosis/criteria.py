@@ -250,11 +250,11 @@ class DriveLevelCriteria:
 
 @dataclass(frozen=True)
 class VaryingCriteria:
-    """How much steering, drive and clock may differ between recordings of free driving, and how fast they drift.
+    """How much steering, drive, clock and rigid body may differ between recordings, and how fast they drift.
 
     ``offset_rad``, ``offset_per_m``, ``offset_s``, ``gain``
-        Typical difference between recordings: of an axle angle [rad], of the curvature of a differential vehicle's
-        path [1/m], of the clocks of camera and vehicle [s], and of the logarithm of a gain.
+        Typical difference between recordings: of an axle angle or of the measured heading [rad], of the curvature of a
+        differential vehicle's path [1/m], of the clocks of camera and vehicle [s], and of the logarithm of a gain.
     ``share_within``
         Typical variation within a recording, for seconds, as a share of that.
     ``spread_between``, ``spread_within``

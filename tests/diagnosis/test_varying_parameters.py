@@ -152,7 +152,8 @@ class Recordings:
     In it the vehicle is steered beside what is recorded, by `steering_us`, and drives `faster`. If the drive is
     `held`, each recording has one drive command, which no other one has. In the morning the axles are steered by the
     share `reach` of what they are in the evening. The front axle has an end stop, `limit_us` from neutral. In the
-    evening commands are given later than the logger says, by `later_s`.
+    evening commands are given later than the logger says, by `later_s`, and the rigid body of the markers is defined
+    with its heading turned by `body_rad`. The rear axle is steered unless it is `straight`.
     """
 
     header = FREE_HEADER
@@ -166,7 +167,10 @@ class Recordings:
         reach: float = 1.0,
         limit_us: float = np.inf,
         later_s: float = 0.0,
+        body_rad: float = 0.0,
+        straight: bool = False,
     ) -> None:
+        self._straight = straight
         self._held = itertools.cycle([1100.0, 1150.0, 1200.0, 1125.0] if held else [None])
         self._reach = itertools.cycle([reach, reach, reach, 1.0])
         recorded, driven = (
@@ -175,7 +179,8 @@ class Recordings:
         )
         splits = ("fit", "fit", "fit", "held_out")
         logged = recorded[3].commands
-        test = replace(driven[3], commands=replace(logged, t_s=logged.t_s - later_s))
+        frames = replace(driven[3].frames, heading_rad=driven[3].frames.heading_rad + body_rad)
+        test = replace(driven[3], commands=replace(logged, t_s=logged.t_s - later_s), frames=frames)
         self.runs = [
             replace(run, session="evening" if k == 3 else "morning", split=splits[k], extra={"source": f"{k}.csv"})
             for k, run in enumerate([*recorded[:3], test])
@@ -185,7 +190,8 @@ class Recordings:
         commands, held = joystick(seconds, rng, next(self._reach)), next(self._held)
         drive = commands.drive if held is None else np.full_like(commands.drive, held)
         front = np.clip(commands.front + steering_us, NEUTRAL - limit_us, NEUTRAL + limit_us)
-        return replace(commands, front=front, drive=drive)
+        rear = np.full_like(front, NEUTRAL) if self._straight else commands.rear
+        return replace(commands, front=front, rear=rear, drive=drive)
 
     def __iter__(self) -> Iterator[Run]:
         return iter(self.runs)
@@ -234,6 +240,27 @@ def test_a_clock_that_is_less_off_than_a_session_must_be_is_followed(later_s):
     assert any("clock offset" in line for line in sessions_in_words({"provenance": found.provenance}))
 
 
+def test_a_rigid_body_that_was_defined_anew_is_followed():
+    found = diagnose(Recordings(body_rad=0.05, straight=True))
+    errors = held_out(found)
+    assert errors["after"] < 0.35 * errors["population"]
+    value, stderr = at_end(found, "body_offset_rad")
+    assert value == pytest.approx(0.05, abs=0.003)
+    assert 0.0 < stderr < 0.003
+    assert any("body offset 0.0" in line for line in sessions_in_words({"provenance": found.provenance}))
+
+
+@given(st.floats(-0.3, 0.3), st.integers(0, 2))
+def test_another_heading_of_the_rigid_body_turns_the_path_about_its_beginning(angle, seed):
+    rng = np.random.default_rng(seed)
+    start, poses = rng.normal(size=(4, 3)), rng.normal(size=(4, 8, 3))
+    model = VaryingModel(cast(Predictor, SimpleNamespace(readings=SimpleNamespace(start=start))), np.empty(0), poses)
+    turned = model._turned(poses, np.full(4, angle))
+    before, after = ((of[..., :2] - start[:, None, :2]) @ [1.0, 1.0j] for of in (poses, turned))
+    np.testing.assert_allclose(after, before * np.exp(-1.0j * angle), atol=1e-12)
+    np.testing.assert_array_equal(turned[..., 2], poses[..., 2])
+
+
 def test_a_map_beyond_the_training_commands_is_followed():
     found = diagnose(Recordings(reach=0.5, limit_us=200.0))
     errors = held_out(found)
@@ -273,7 +300,7 @@ def test_the_curvature_of_a_differential_vehicle_varies_between_recordings_only(
     provenance = diagnose(Campaign(Differential(right_wheel=1.03))).provenance
     assert provenance["criteria"]["varying"]["offset_per_m"] > 0.0
     varying = provenance["windows"]["varying"]
-    slow = {"front_offset_per_m", "clock_offset_s"}
+    slow = {"front_offset_per_m", "clock_offset_s", "body_offset_rad"}
     assert {*varying["between_recordings"]} == {"front_gain", "drive_gain", *slow}
     assert {*varying["within_recordings"]} == {"front_gain", "drive_gain"}
 
@@ -284,7 +311,7 @@ def test_a_vehicle_that_stays_the_same_is_predicted_as_well():
     assert errors["population"] < 1.5  # mm: 0.3 mm and 0.8 mrad of a frame are in it
     assert errors["after"] == pytest.approx(errors["population"], rel=0.2)
     assert [effect.name for effect in found.effects] == ["steering_lag"]
-    for name in ("front_offset_rad", "front_gain", "drive_gain", "clock_offset_s"):
+    for name in ("front_offset_rad", "front_gain", "drive_gain", "clock_offset_s", "body_offset_rad"):
         value, stderr = at_end(found, name)
         assert abs(value) < 3.0 * stderr
     assert not list(sessions_in_words({"provenance": found.provenance}))

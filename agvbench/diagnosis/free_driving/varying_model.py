@@ -1,4 +1,4 @@
-"""A fitted model of which steering, drive, clock and maps have other values in each window.
+"""A fitted model of which steering, drive, clock, rigid body and maps have other values in each window.
 
 Two kinds of values differ: what varies between recordings, such as the level of the drive, and nodal values of the maps
 that the training windows hardly determine.
@@ -18,17 +18,18 @@ from agvbench.types import Floats
 
 _LEAST_SIZE = 1e-3
 _RAD, _PER_M, _S = "rad", "per_m", "s"
-_CLOCK = "clock"
+_CLOCK, _BODY = "clock", "body"
 _STEP, _STEP_S = 1e-3, 0.02
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What may vary: the offset or the gain of a channel's static map, or the offset of the clock.
+    """What may vary: the offset or the gain of a channel's static map, or the offset of the clock or the rigid body.
 
     Gains are natural logarithms of factors. The offset of a steered axle is an angle. That of a differential vehicle's
     yaw rate is proportional to the speed, as with wheels of unequal diameters: a curvature. The offset of the clock is
-    by how much later than its stamps a command is given, as in `Simulation.predict`.
+    by how much later than its stamps a command is given, as in `Simulation.predict`. That of the rigid body is by how
+    much the measured heading is larger than the vehicle's, since its axes were defined anew.
     """
 
     role: str
@@ -41,8 +42,8 @@ class Quantity:
 
     @property
     def varies_within(self) -> bool:
-        """Whether it may also vary for seconds: not a curvature or a clock, since wheels and clocks do not."""
-        return self.unit not in (_PER_M, _S)
+        """Whether it may also vary for seconds: wheels, clocks and rigid bodies do not."""
+        return self.role not in (_CLOCK, _BODY) and self.unit != _PER_M
 
     @property
     def step(self) -> float:
@@ -69,7 +70,7 @@ class VaryingModel:
 
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
-        """What may vary: offset and gain of each channel that steers, the gain of the drive, and the clock.
+        """What may vary: offset and gain of each channel that steers, the gain of the drive, clock and rigid body.
 
         A channel with one command in all windows does not steer. Quantities that vary within a recording come first.
         """
@@ -77,7 +78,8 @@ class VaryingModel:
         unit = _PER_M if self.predictor.batch.geometry.is_differential else _RAD
         steered = [role for role in ROLES if role != "drive" and len(nodes[role]) > 1]
         of_maps = [*(Quantity(role, of) for role in steered for of in (unit, "")), Quantity("drive")]
-        return tuple(sorted([*of_maps, Quantity(_CLOCK, _S)], key=lambda quantity: not quantity.varies_within))
+        others = [Quantity(_CLOCK, _S), Quantity(_BODY, _RAD)]
+        return tuple(sorted([*of_maps, *others], key=lambda quantity: not quantity.varies_within))
 
     @cached_property
     def steps(self) -> Floats:
@@ -110,15 +112,27 @@ class VaryingModel:
         batch, quantities = self.predictor.batch, self.quantities
         settled, initial = self.predictor.settled(self.parameters)
         self._add_components(settled, values[:, len(quantities) :])
-        later_s = np.zeros(len(values))
+        later_s, turned = np.zeros(len(values)), np.zeros(len(values))
         for k, quantity in enumerate(quantities):
             if quantity.role == _CLOCK:
                 later_s += values[:, k]
+            elif quantity.role == _BODY:
+                turned += values[:, k]
             else:
                 self._change(settled, quantity, values[batch.base.row_runs, k])
         parameters, deviation = self.predictor.all_parameters(self.parameters), batch.nodal_deviation
         poses = batch.base.predict(settled, parameters, initial, nodal_deviation=deviation, later_s=later_s)
-        return poses.reshape(len(values), -1, 3)
+        return self._turned(poses.reshape(len(values), -1, 3), turned)
+
+    def _turned(self, poses: Floats, angle: Floats) -> Floats:
+        """Return `poses` (W, K, 3) of vehicles whose measured heading is larger than their own by `angle` (W,).
+
+        The path turns about its beginning. The measured change of heading is that of the vehicle.
+        """
+        along, across = (np.cos(angle) - 1.0)[:, None], np.sin(angle)[:, None]
+        x, y = np.moveaxis(poses[..., :2] - self.predictor.readings.start[:, None, :2], -1, 0)
+        change = np.stack([along * x + across * y, along * y - across * x, np.zeros_like(x)], axis=-1)
+        return np.asarray(poses + change)
 
     def _change(self, settled: Floats, quantity: Quantity, of_row: Floats) -> None:
         """Change angles and speeds of every row (rows, 3) by the value `of_row` (rows,) of a quantity of a map."""

@@ -1,9 +1,9 @@
-"""Parameters that differ between recordings and drift: steering offset and gain, level of the drive, and clock.
+"""Parameters that differ between recordings and drift: steering offset and gain, drive level, clock and rigid body.
 
-A battery is charged, a linkage is knocked, another floor is driven on, the clocks of camera and vehicle differ. The
-model of the selected effects has one value of each for all recordings. A recording's own value is estimated from the
-residuals of the windows that ended before a prediction begins. So are the nodal values of maps at commands that the
-training windows hardly have.
+A battery is charged, a linkage is knocked, another floor is driven on, the clocks of camera and vehicle differ, the
+rigid body of the markers is defined anew. The model of the selected effects has one value of each for all recordings. A
+recording's own value is estimated from the residuals of the windows that ended before a prediction begins. So are the
+nodal values of maps at commands that the training windows hardly have.
 """
 
 from __future__ import annotations
