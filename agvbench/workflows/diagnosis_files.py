@@ -130,6 +130,19 @@ def left_in_words(content: Mapping[str, Any]) -> Iterator[str]:
             yield f"What is left depends on {d['covariate']} through {d.get('through', 'the motion')}{of_it}."
 
 
+def term_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield whether the discrepancy term of free driving holds in the test windows."""
+    term = mapping(mapping(content.get("provenance")).get("empirical_term"))
+    errors = mapping(term.get("held_out_position_mm"))
+    now, without = number(errors.get("with")), number(errors.get("without"))
+    if not math.isnan(now + without):
+        holds = "holds" if now < without else "does not hold"
+        yield (
+            f"{term.get('name')} {holds} in the test windows: position error {now:.0f} mm with it, {without:.0f} mm "
+            "without it (as fitted)."
+        )
+
+
 def fit_in_words(content: Mapping[str, Any]) -> Iterator[str]:
     """Yield which runs the lack of fit is of, the repeatability of which runs it is compared with, and its p-value."""
     provenance = mapping(content.get("provenance"))

@@ -27,6 +27,12 @@ def joystick(seconds: float, rng: np.random.Generator, reach: float = 1.0) -> Co
     )
 
 
+def circling(seconds: float, rng: np.random.Generator) -> Commands:
+    """Return the commands of a driver who stays about the same place, on circles of wandering radius."""
+    commands = joystick(seconds, rng, reach=0.5)
+    return dataclasses.replace(commands, front=commands.front + 250.0, rear=commands.rear - 150.0)
+
+
 def calm(seconds: float, rng: np.random.Generator) -> Commands:
     """Return the commands of a driver who hardly changes the speed and turns the front axle slowly."""
     drive, front = 1150.0 + _wander(seconds, rng, 20.0, 1.5), NEUTRAL + _wander(seconds, rng, 350.0, 3.0)

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from tiny_vehicle import FRONT_M, NEUTRAL, NEUTRAL_COMMAND, REAR_M, Tiny, campaign_runs
 
 from agvbench.diagnosis.data.readings import read_runs
-from agvbench.diagnosis.model.batch import Batch, GroupedSums
+from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import nodal_maps
+from agvbench.diagnosis.model.perturbations import GroupedSums
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.vehicle.geometry import Geometry
 
@@ -33,7 +34,7 @@ def predictor():
     readings = read_runs(campaign_runs(Tiny())).select(np.arange(0, 40, 4))
     maps = nodal_maps(readings.runs, NEUTRAL_COMMAND)
     batch = Batch(readings, maps, Geometry(FRONT_M, REAR_M))
-    assert not batch.by_node
+    assert not batch.perturbations.by_node
     return Predictor(batch, ("steering_lag",))
 
 

@@ -197,7 +197,7 @@ def test_slopes_by_nodes_are_those_of_whole_maps(readings):
     some = readings.select(np.arange(0, len(readings), 9))
     maps = smooth_maps(some.runs, NEUTRAL_COMMAND, 9, 6)
     batch = Batch(some, maps, GEOMETRY, 0.1)
-    assert batch.by_node
+    assert batch.perturbations.by_node
     predictor = Predictor(batch, ("steering_lag", "cornering_speed_loss"))
     values = np.r_[start_values_of_windows(maps, some, GEOMETRY), 0.1, 0.05]
     none = np.zeros((len(some), 6))

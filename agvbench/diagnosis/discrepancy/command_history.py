@@ -91,11 +91,17 @@ def _rows(batch: Batch, rates: Rates) -> tuple[NDArray[np.int64], Floats]:
     rows, since_s = np.empty(len(rates.run), dtype=np.int64), np.empty(len(rates.run))
     for r in np.unique(rates.run):
         own = rates.run == r
-        times, now = batch.readings.runs[r].commands.t_s, rates.covariates["time_in_run_s"][own]
+        times, now = _times(batch, int(r)), rates.covariates["time_in_run_s"][own]
         at = np.searchsorted(times, now, side="right")
         rows[own] = batch.base.row_starts[r] + at
         since_s[own] = np.maximum(now - np.r_[times[:1], times][at], 0.0)
     return rows, since_s
+
+
+def _times(batch: Batch, run: int) -> Floats:
+    """Return the times of a run's commands that are simulated; its first row is what was commanded before."""
+    first, last = batch.base.row_starts[run : run + 2]
+    return batch.base.command_t_s[first + 1 : last]
 
 
 class _Axle:
@@ -142,9 +148,8 @@ def _axles_at_rows(batch: Batch, commands: Floats, angles: Floats, reach: float)
 def _drive_at_rows(batch: Batch, velocity: Floats) -> tuple[Floats, Floats]:
     """Return the mean speed before each command (rows, times), and when the drive last reversed (rows,) [s]."""
     load, reversed_at_s = np.zeros((len(velocity), len(LOADS_S))), np.full(len(velocity), -np.inf)
-    for r, run in enumerate(batch.readings.runs):
-        first, last = batch.base.row_starts[r : r + 2]
-        times = run.commands.t_s
+    for r, (first, last) in enumerate(pairwise(batch.base.row_starts.tolist())):
+        times = _times(batch, r)
         left = np.exp(-np.diff(times, prepend=times[0])[:, None] / LOADS_S)
         direction = np.sign(velocity[first])
         for row in range(first + 1, last):
@@ -162,9 +167,8 @@ def _moves(batch: Batch, angles: Floats) -> Floats:
     That is the sum of both amounts, and the way of either axle with its sign, for steady-state angles (rows, 2).
     """
     moves = np.zeros((len(angles), 3, len(RECOVERIES_S)))
-    for r, run in enumerate(batch.readings.runs):
-        first, last = batch.base.row_starts[r : r + 2]
-        times = run.commands.t_s
+    for r, (first, last) in enumerate(pairwise(batch.base.row_starts.tolist())):
+        times = _times(batch, r)
         left = np.exp(-np.diff(times, prepend=times[0])[:, None] / RECOVERIES_S)
         ways = np.diff(angles[first:last], axis=0)
         ways = np.column_stack([np.abs(ways).sum(axis=1), ways])[:, :, None]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from agvbench.diagnosis.criteria import DISCREPANCY
-from agvbench.diagnosis.discrepancy.stepwise import TERM_NAMES, add_masked_effects, best_term, screened_terms
+from agvbench.diagnosis.discrepancy.best_term import best_term, screened_terms
+from agvbench.diagnosis.discrepancy.stepwise import TERM_NAMES, add_masked_effects
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
 from agvbench.diagnosis.selection.stepwise import Selection, Selector

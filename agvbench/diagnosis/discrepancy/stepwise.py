@@ -9,13 +9,16 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.diagnosis.criteria import DISCREPANCY, FIT, SELECTION
-from agvbench.diagnosis.discrepancy.campaign_time import complement, is_constant
-from agvbench.diagnosis.discrepancy.command_history import command_history
+from agvbench.diagnosis.discrepancy.best_term import (
+    best_term,
+    is_constant_change,
+    screened_terms,
+    terms_without_regression,
+)
+from agvbench.diagnosis.discrepancy.campaign_time import complement
 from agvbench.diagnosis.discrepancy.other_forms import models_of_other_forms, with_other_forms
-from agvbench.diagnosis.discrepancy.screening import Start, screen
-from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.selection.actuators import CAMERA, prefer_actuators, separate_lag_from_delay
-from agvbench.diagnosis.selection.candidates import applies, candidate
+from agvbench.diagnosis.selection.candidates import candidate
 from agvbench.diagnosis.selection.equal_descriptions import with_equal_descriptions
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.lack_of_fit import has_lack_of_fit
@@ -27,15 +30,13 @@ from agvbench.diagnosis.selection.variants import (
     with_extended_library,
 )
 from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
-from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm
+from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime
 from agvbench.effects.variants import cause_of
 
 ModelWithTerm = tuple[ScoredModel, type[DiscrepancyTerm], dict[str, float]]
 """A model with a term, the term, and the gains of the effects beside it."""
 
-_MAX_STARTS = 8
-_COORDINATES = frozenset({"x_m", "y_m"})
 TERM_NAMES = frozenset(term.name for term in TERMS)
 
 
@@ -172,7 +173,7 @@ def _with_other_change(extended: Selector, selection: Selection, model: ModelWit
         shapes = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1]).reshape(-1, 2, len(kind.bounds))
         for sizes in shapes if issubclass(start.term, ByCampaignTime) else ():
             other = extended.with_effect(without, start.term.name, replace(kind, starts=sizes))
-            if other.is_fitted and other.deviance < best.deviance and not _is_constant_change(other, start.term):
+            if other.is_fitted and other.deviance < best.deviance and not is_constant_change(other, start.term):
                 best, term = other, start.term
     if best.gain_over(chosen) < SELECTION.alternative_margin:
         return model
@@ -251,72 +252,6 @@ def add_term_and_reconsider(
     return selection, term_selection, selector
 
 
-def screened_terms(extended: Selector, root: ScoredModel) -> list[Start]:
-    """Return initial values of the terms with the largest predicted gains beside `root`, the best first.
-
-    Noise of the poses hides from rates a small bias that lasts for whole runs. If no term is found in the rates of a
-    model that lacks fit, the poses decide.
-    """
-    batch = extended.batch
-    poses = root.fit.predictor.predict(root.fit.parameters)
-    rates = residual_rates(batch.readings, poses)
-    history = command_history(batch, root.fit.parameters, rates)
-    starts = screen(rates, history, batch.geometry, batch.readings.group, extended.seed)
-    least = max(DISCREPANCY.min_predicted_gain, DISCREPANCY.min_share_of_best_start * starts[0].gain) if starts else 0.0
-    starts = [start for start in starts if start.gain > least] or _linearised_terms(extended, root)
-    return starts[: DISCREPANCY.max_starts]
-
-
-def _linearised_terms(extended: Selector, root: ScoredModel) -> list[Start]:
-    """Return the terms that gain by a linearisation beside a model that lacks fit, the largest predicted gain first.
-
-    Terms of many parameters are left out: their initial values are a matter of regression.
-    """
-    if not has_lack_of_fit(root):
-        return []
-    starts = []
-    for term in _terms_without_regression(extended):
-        values = candidate(term).starts
-        if len(values) <= _MAX_STARTS:
-            starts.append(Start(term, values, extended.predicted_gain(root, term.name)))
-    likely = [start for start in starts if start.gain > extended.min_gain]
-    return sorted(likely, key=lambda start: -start.gain)
-
-
-def _terms_without_regression(extended: Selector) -> list[type[DiscrepancyTerm]]:
-    """Return the terms that this vehicle can have, without those whose logged column only a regression can choose."""
-    return [term for term in TERMS if not issubclass(term, ByLoggedColumn) and applies(term, extended.batch.geometry)]
-
-
-def best_term(
-    extended: Selector, root: ScoredModel, starts: list[Start]
-) -> tuple[ScoredModel, type[DiscrepancyTerm]] | None:
-    """Return the best model with a term beside `root`, and the term; None if no term meets the criterion."""
-    best: tuple[ScoredModel, type[DiscrepancyTerm]] | None = None
-    for start in starts:
-        kind = candidate(start.term)
-        values = np.clip(start.values, kind.bounds[:, 0], kind.bounds[:, 1])
-        screened = replace(kind, starts=values, screened=True, patient=start is starts[0], expected_gain=start.gain)
-        model = extended.with_effect(root, start.term.name, screened)
-        if _is_constant_change(model, start.term) or _is_outside_the_room(model, start.term):
-            continue
-        if extended.meets_criterion(root, model) and (best is None or model.deviance < best[0].deviance):
-            best = model, start.term
-    return best
-
-
-def _is_constant_change(model: ScoredModel, term: type[DiscrepancyTerm]) -> bool:
-    """Return whether a term of campaign time was fitted to a change that is none."""
-    if not issubclass(term, ByCampaignTime) or not model.is_fitted:
-        return False
-    return is_constant(model.values_of(term.name), model.fit.predictor.readings.started_h)
-
-
-def _is_outside_the_room(model: ScoredModel, term: type[DiscrepancyTerm]) -> bool:
-    """Return whether a term of a place was fitted to one at a bound: it stands for a direction on the floor."""
-    return model.is_fitted and not _COORDINATES.isdisjoint(model.parameters_at_bound(term.name))
-
-
 def _may_be_mimicked(selection: Selection, with_term: ScoredModel) -> bool:
     """Return whether a term alone gains a noticeable share of what all effects gain, as if they only mimicked it."""
     gain = selection.base.deviance - with_term.deviance
@@ -337,7 +272,7 @@ def _term_in_place_of_effect(
         without = extended.without_effect(selection.base, selection.chosen, name)
         # What is predicted is a gain of the fit, and not a cross-validated one.
         least = DISCREPANCY.min_share_of_effects * selection.chosen.fit_gain_over(without)
-        for term in _terms_without_regression(extended):
+        for term in terms_without_regression(extended):
             if term.longest_step_s < math.inf:
                 continue
             if extended.predicted_gain(without, term.name) < least:

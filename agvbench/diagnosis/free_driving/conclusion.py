@@ -22,8 +22,16 @@ from agvbench.diagnosis.findings.omitted_effects import omitted_effects
 from agvbench.diagnosis.findings.prior_checks import check_priors, provenance_of, with_contradictions, with_evidence
 from agvbench.diagnosis.findings.residual_table import with_residuals
 from agvbench.diagnosis.free_driving.command_range import beyond_range, command_ranges
+from agvbench.diagnosis.free_driving.describing_term import SelectionWithTerm
 from agvbench.diagnosis.free_driving.drive_level import DriveLevel
-from agvbench.diagnosis.free_driving.errors import QUANTITIES, WindowErrors, repeatability_squares, rms, squares
+from agvbench.diagnosis.free_driving.errors import (
+    QUANTITIES,
+    WindowErrors,
+    exceeds_repeatability,
+    repeatability_squares,
+    rms,
+    squares,
+)
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error, constant_velocity, prior_model, speed_held
 from agvbench.diagnosis.free_driving.selection import WindowSelector
 from agvbench.diagnosis.free_driving.varying_model import VaryingModel
@@ -37,6 +45,7 @@ from agvbench.diagnosis.result import Diagnosis, HeldOut, NamedEffect, Verdict
 from agvbench.diagnosis.selection.candidates import bounds_of
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
+from agvbench.diagnosis.selection.with_term import TermSelection, with_terms_first
 from agvbench.effects.variants import cause_of
 from agvbench.types import Floats
 
@@ -46,7 +55,8 @@ class WindowConclusion:
     """Assesses the selection on the test windows.
 
     ``readings`` are all windows, with their ``split``. Those ``assessed`` (indices) are predicted here. ``static`` are
-    the maps without effects, fitted to the training windows. ``levels`` are those of the drive by session.
+    the maps without effects, fitted to the training windows. ``levels`` are those of the drive by session. ``library``
+    is the selection of effects by ``selector``; ``with_term`` is that with a discrepancy term, if there is one.
     """
 
     context: DiagnosisContext
@@ -55,8 +65,20 @@ class WindowConclusion:
     assessed: NDArray[np.int64]
     static: Fit
     selector: WindowSelector
-    selection: Selection
+    library: Selection
     levels: Mapping[str, DriveLevel]
+    with_term: SelectionWithTerm | None = None
+    _errors: dict[ScoredModel, float] = dataclasses.field(init=False, default_factory=dict)
+
+    @property
+    def term(self) -> TermSelection | None:
+        """The selection with a discrepancy term, if there is one."""
+        return self.with_term.terms if self.with_term else None
+
+    @property
+    def selection(self) -> Selection:
+        """The selection that predicts: with the discrepancy term, if there is one."""
+        return self.term.selection if self.term else self.library
 
     @cached_property
     def assessment(self) -> Readings:
@@ -90,8 +112,12 @@ class WindowConclusion:
         held_out = self._held_out(before, poses, perturbed)
         # Many windows make even small structure significant: within repeatability it needs no cause.
         rest = self._dependences(poses) if _above(held_out, RESIDUAL.within_repeatability) else []
-        far = self._far_above_noise(held_out)
-        verdict, why = with_contradictions(*_verdict(effects, rest, far), checks)
+        far = exceeds_repeatability(
+            self.assessment.select(self.held), poses[self.held], perturbed[self.held], RESIDUAL.far_above_noise
+        )
+        term = self.term
+        rest = with_terms_first(rest, term) if term else rest
+        verdict, why = with_contradictions(*_verdict(effects, rest, far, term), checks)
         found = Diagnosis(
             verdict,
             why,
@@ -103,6 +129,7 @@ class WindowConclusion:
             self.selection.rejected,
             context.provenance(self.readings)
             | self._fit_provenance(horizon, predicted, perturbed)
+            | (self._term_provenance(term) if term else {})
             | provenance_of(checks),
             states=effect_states(chosen.fit, effects, omitted),
         )
@@ -127,9 +154,17 @@ class WindowConclusion:
                 "varying": self._varying_parameters(),
                 "commands": {role: of_channel.to_table() for role, of_channel in ranges.items()},
                 "recordings": errors.by_recording(self.held, beyond),
-                "effects": self._effect_errors(predicted["population"]),
+                "effects": self._effect_errors(),
             },
         }
+
+    def _term_provenance(self, term: TermSelection) -> dict[str, object]:
+        """Return the entry of the discrepancy term, with the position errors of the test windows with and without it.
+
+        Both are those of models as fitted.
+        """
+        errors = {"with": self._error_of(term.selection.chosen), "without": self._error_of(term.without)}
+        return {"empirical_term": {**term.entries[0], "held_out_position_mm": errors}}
 
     def _sessions(self) -> dict[str, dict[str, object]]:
         """Return the clock offset and the level of the drive of each session, beside those of the others."""
@@ -175,7 +210,7 @@ class WindowConclusion:
 
     @cached_property
     def _every(self) -> Batch:
-        batch = self.selector.batch
+        batch = self.selection.chosen.fit.predictor.batch
         return Batch(self.readings, batch.maps, self.context.geometry, batch.nodal_deviation, kinds=batch.kinds)
 
     def _held_out(self, before: Floats, after: Floats, perturbed: Floats) -> HeldOut:
@@ -195,51 +230,44 @@ class WindowConclusion:
                 worse.append(name)
         return HeldOut(len(kept), errors, tuple(worse))
 
-    def _far_above_noise(self, held_out: HeldOut) -> bool:
-        """Return whether an error is far above that of frames and of a vehicle of typical repeatability."""
-        kept = self.assessment.select(self.held)
-        moved = np.abs(kept.poses[:, -1] - kept.start)
-        distance = 1e3 * float(np.sqrt(np.nanmean(moved[:, 0] ** 2 + moved[:, 1] ** 2)))
-        turn = float(np.degrees(np.sqrt(np.nanmean(moved[:, 2] ** 2))))
-        for name, error in held_out.errors.items():
-            typical = RESIDUAL.typical_repeatability * (distance if name.endswith("_mm") else turn)
-            if error["after"] > RESIDUAL.far_above_noise * float(np.hypot(error["floor"], typical)):
-                return True
-        return False
-
-    def _effect_errors(self, poses: Floats) -> dict[str, dict[str, object]]:
+    def _effect_errors(self) -> dict[str, dict[str, object]]:
         """Return for each effect whether it was selected, and the position error with and without it.
 
         Both are those of models as fitted, because estimates from earlier windows take the place of a missing effect.
-        An effect without predicted gain was not fitted: its gain is zero, and it has no error.
+        An effect without predicted gain was not fitted: its gain is zero, and it has no error. One that was not
+        selected is beside the effects that were selected before a discrepancy term.
         """
-        chosen = self.selection.chosen
-        out: dict[str, dict[str, object]] = {}
-        now, causes = self._error(poses), {cause_of(name) for name in chosen.names}
+        names, out = self.selection.chosen.names, {}
+        causes = {cause_of(name) for name in names}
+        final = self.selection, self.with_term.selector if self.with_term else self.selector
         for name in self.selector.candidates:
-            kept = name in chosen.names
+            kept = name in names
             if name in self.selector.given or (not kept and cause_of(name) in causes):
                 continue
-            if kept:
-                other: ScoredModel | None = self.selector.without_effect(self.selection.base, chosen, name)
-            else:
-                other = self.selector.known((*chosen.names, name))
-            error = None if other is None else self._error(self._as_fitted(other.fit))
+            with_it, without, gain = _with_and_without(name, *(final if kept else (self.library, self.selector)))
             out[cause_of(name)] = {
                 "kept": kept,
-                "gain": self.selection.gains[name] if kept else chosen.deviance - other.deviance if other else 0.0,
+                "gain": gain,
                 "extrapolates": name in self.selector.extrapolating,
-                "held_out_position_mm": {"with": now if kept else error, "without": error if kept else now},
+                "held_out_position_mm": {"with": self._error_of(with_it), "without": self._error_of(without)},
             }
         return out
 
-    def _as_fitted(self, fitted: Fit) -> Floats:
-        """Return the poses that a model predicts for every assessed window."""
-        return Predictor(self._every, fitted.predictor.effects).predict(fitted.parameters)[self.assessed]
+    @cached_property
+    def _tested(self) -> Batch:
+        """The test windows that are predicted here."""
+        batch, tested = self._every, self.assessment.select(self.held)
+        return Batch(tested, batch.maps, batch.geometry, batch.nodal_deviation, kinds=batch.kinds)
 
-    def _error(self, poses: Floats) -> float:
-        name = "position_rms_mm"
-        return rms(squares(self.assessment.select(self.held), poses[self.held])[name], name)
+    def _error_of(self, model: ScoredModel | None) -> float | None:
+        """Return the position error of a model as fitted in the test windows [mm], or None without a model."""
+        if model is None:
+            return None
+        if model not in self._errors:
+            poses = Predictor(self._tested, model.fit.predictor.effects).predict(model.fit.parameters)
+            name = "position_rms_mm"
+            self._errors[model] = rms(squares(self._tested.readings, poses)[name], name)
+        return self._errors[model]
 
     def _dependences(self, poses: Floats) -> list[Dependence]:
         """Return the dependences of the residual, with blocks of driving as units."""
@@ -250,13 +278,30 @@ class WindowConclusion:
         return dependences(clustered, np.arange(int(stretch.max()) + 1), self.context.seed)
 
 
+def _with_and_without(
+    name: str, selection: Selection, selector: WindowSelector
+) -> tuple[ScoredModel | None, ScoredModel | None, float]:
+    """Return the selected model with and without an effect, None if it was not fitted, and what the effect gains."""
+    chosen = selection.chosen
+    if name in chosen.names:
+        return chosen, selector.without_effect(selection.base, chosen, name), selection.gains[name]
+    other = selector.known((*chosen.names, name))
+    return other, chosen, chosen.deviance - other.deviance if other else 0.0
+
+
 def _above(held_out: HeldOut, times: float) -> bool:
     return any(e["after"] > times * e["floor"] for e in held_out.errors.values())
 
 
-def _verdict(effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool) -> tuple[Verdict, str]:
+def _verdict(
+    effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool, term: TermSelection | None
+) -> tuple[Verdict, str]:
     if rest:
-        return Verdict.UNKNOWN, f"structure remains that no effect explains: it depends on {rest[0].covariate}"
+        described = f", and {term.names} describes it in the training windows" if term else ""
+        return (
+            Verdict.UNKNOWN,
+            f"structure remains that no effect explains: it depends on {rest[0].covariate}{described}",
+        )
     if far:
         return Verdict.UNKNOWN, (
             f"the residuals are more than {RESIDUAL.far_above_noise:g} times what noise explains, "

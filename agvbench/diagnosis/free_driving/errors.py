@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.diagnosis.criteria import RESIDUAL
 from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.window_splits import _initial_states
 from agvbench.diagnosis.data.windows import SAMPLES
@@ -65,6 +66,22 @@ def repeatability_squares(readings: Readings, perturbed: Floats, sample: int = -
         "delta_s_mm": position,
         "delta_heading_deg": heading,
     }
+
+
+def exceeds_repeatability(readings: Readings, poses: Floats, perturbed: Floats, times: float) -> bool:
+    """Return whether an error of predicted `poses` (W, K, 3) at the horizon is several `times` the repeatability.
+
+    That of the vehicle is unknown without repeats. A typical one is assumed, beside the noise of frames: see
+    `repeatability_squares`, also for `perturbed`.
+    """
+    now, least = squares(readings, poses), repeatability_squares(readings, perturbed)
+    moved = readings.poses[:, -1] - readings.start
+    for name in QUANTITIES:
+        way = moved[:, 0] ** 2 + moved[:, 1] ** 2 if name.endswith("_mm") else moved[:, 2] ** 2
+        typical = float(np.hypot(rms(least[name], name), RESIDUAL.typical_repeatability * rms(way, name)))
+        if rms(now[name], name) > times * typical:
+            return True
+    return False
 
 
 def rms(values: Floats, name: str) -> float:

@@ -21,6 +21,7 @@ from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.design.propose import with_next_experiment
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
+from agvbench.diagnosis.free_driving.describing_term import SelectionWithTerm, with_describing_term
 from agvbench.diagnosis.free_driving.drive_level import DriveLevel, drive_levels, nodal_deviation
 from agvbench.diagnosis.free_driving.maps import NODES, smooth_maps, start_values_of_windows
 from agvbench.diagnosis.free_driving.predictors import autocorrelation_time
@@ -44,12 +45,16 @@ ABSORBED_IN_WINDOWS = frozenset({"mocap_scale"})
 
 @dataclass(frozen=True)
 class SelectedFromWindows:
-    """Static maps without effects, the selector, its selection, and the level of the drive of each session."""
+    """Static maps without effects, the selector, its selection, and the level of the drive of each session.
+
+    ``with_term`` is the selection with a discrepancy term, if one describes what the effects leave.
+    """
 
     static: Fit
     selector: WindowSelector
     selection: Selection
     levels: Mapping[str, DriveLevel]
+    with_term: SelectionWithTerm | None
 
 
 @dataclass
@@ -115,7 +120,7 @@ class FreeDriving(Method[SelectedFromWindows]):
         levels = self._drive_levels(readings, split, static)
         selector = self._selector(readings, split, static, levels)
         selection, selector = self._selected_effects(selector)
-        return SelectedFromWindows(static, selector, selection, levels)
+        return SelectedFromWindows(static, selector, selection, levels, with_describing_term(selection, selector))
 
     @staticmethod
     def _selected_effects(selector: WindowSelector) -> tuple[Selection, WindowSelector]:
@@ -125,7 +130,8 @@ class FreeDriving(Method[SelectedFromWindows]):
         separate, selector = separate_channels(selection, selector)
         if separate is not selection:
             selection = selector.select(separate.chosen, ACTUATORS)
-        return select_drive(selection, selector)
+        selection, selector = select_drive(selection, selector)
+        return selector.with_alternatives(selection), selector
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromWindows) -> Diagnosis:
         """Open the test windows, and return the diagnosis."""
@@ -142,7 +148,10 @@ class FreeDriving(Method[SelectedFromWindows]):
             selected.selector,
             selected.selection,
             selected.levels,
+            selected.with_term,
         ).diagnosis(self.horizon)
+        if selected.with_term:
+            return found
         self.on_progress("choosing the run to drive next")
         return with_next_experiment(found, selected.selection, readings, self.context.header, self.context.seed)
 

@@ -8,6 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from agvbench.diagnosis.criteria import FREE_DRIVING, SelectionCriteria
+from agvbench.diagnosis.discrepancy.stepwise import TERM_NAMES
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.actuators import ACTUATORS, CAMERA, SERVOS_DELAY
@@ -42,13 +43,19 @@ class WindowSelector(Selector):
     ``test_batch`` holds the test windows, of which only commands and initial states are used. An effect extrapolates if
     its median change of the test windows is larger than its change of 98 % of the training windows. Such effects are
     rejected; ``extrapolating`` names them. Only variants of the drive and a delay of each channel are tried: a
-    simulation with every variant takes three times as long.
+    simulation with every variant takes three times as long. Alternatives are computed once, for the final model.
     """
 
     criteria: ClassVar[SelectionCriteria] = FREE_DRIVING
     further_kinds: ClassVar[frozenset[str] | None] = frozenset({SERVOS_DELAY, *DRIVES})
+    finds_alternatives: ClassVar[bool] = False
     test_batch: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
+
+    def with_alternatives(self, selection: Selection) -> Selection:
+        """Return a selection with the alternatives of its effects."""
+        alternatives = self.alternatives(selection.base, selection.chosen)
+        return replace(selection, alternatives=alternatives, tried=self.models_fitted)
 
     def for_batch(self, batch: Batch) -> Self:
         """Return a selector with the same candidates and test windows for another batch, with an empty cache."""
@@ -68,7 +75,7 @@ class WindowSelector(Selector):
         if not super().improves(without, with_it, of_group=of_group):
             return False
         added = set(with_it.names) - set(without.names)
-        if any(with_it.is_at_bound(name) for name in added):
+        if any(with_it.is_at_bound(name) or _is_term_at_bound(with_it, name) for name in added):
             return False
         if self._extrapolates(without, with_it):
             self.extrapolating |= added
@@ -87,6 +94,10 @@ class WindowSelector(Selector):
         """Return the distance between the end positions that both models predict for each window (W,) [m]."""
         small, large = (Predictor(batch, m.fit.predictor.effects).predict(m.fit.parameters) for m in (without, with_it))
         return np.asarray(np.hypot(*(large - small)[:, -1, :2].T))
+
+
+def _is_term_at_bound(model: ScoredModel, name: str) -> bool:
+    return name in TERM_NAMES and bool(model.parameters_at_bound(name))
 
 
 def select_drive(selection: Selection, selector: WindowSelector) -> tuple[Selection, WindowSelector]:

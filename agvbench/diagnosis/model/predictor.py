@@ -182,15 +182,15 @@ class Predictor:
         self, parameters: Floats, random_effects: Floats, base: Floats, settled: Floats, initial: Floats
     ) -> Linearised:
         """Return poses `base` with their derivatives by the nodal values and by the random effects."""
-        batch = self.batch
+        perturbations = self.batch.perturbations
         changes = self._changes_by_perturbations(base, settled, initial, parameters[self.maps.size :])
-        by_own = np.zeros((*base.shape, batch.active.shape[1]))
+        by_own = np.zeros((*base.shape, perturbations.active.shape[1]))
         columns = by_own.transpose(0, 3, 1, 2)
         by_random_effects = np.zeros((*base.shape, len(RANDOM_EFFECTS)))
         by_random_effects[:, :, 0, 0] = by_random_effects[:, :, 1, 1] = 1.0
-        by_random_effects[..., 2] = changes[batch.heading_perturbed]
+        by_random_effects[..., 2] = changes[perturbations.heading]
         for k, role in enumerate(ROLES):
-            perturbed = batch.perturbed[role]
+            perturbed = perturbations.by_role[role]
             change = changes[perturbed.index]
             by_offset, by_level = self._chain_factors(role, parameters, random_effects, settled)
             by_run = perturbed.by_run
@@ -198,7 +198,7 @@ class Predictor:
             weight = perturbed.weight * by_level[perturbed.term]
             run, column = perturbed.by_value.key.T
             columns[run, column] = perturbed.by_value.sums(change[perturbed.term] * weight[:, None, None])
-        return Linearised(base, batch.active, by_own, by_random_effects, self.maps.size)
+        return Linearised(base, perturbations.active, by_own, by_random_effects, self.maps.size)
 
     def _chain_factors(
         self, role: str, parameters: Floats, random_effects: Floats, settled: Floats
@@ -207,11 +207,11 @@ class Predictor:
 
         The first is by the run's random effect, the second by the level or nodal value.
         """
-        perturbed = self.batch.perturbed[role]
+        perturbed = self.batch.perturbations.by_role[role]
         if role != "drive":
             return np.ones(len(perturbed.run)), np.ones(len(perturbed.run))
         factor = np.exp(random_effects[perturbed.run, 5])
-        if self.batch.by_node:
+        if self.batch.perturbations.by_node:
             return factor * parameters[self.maps.slices()[role]][perturbed.row], factor
         return settled[perturbed.row, 2], factor
 
@@ -275,14 +275,14 @@ class Predictor:
 
     def _changes_by_perturbations(self, base: Floats, settled: Floats, initial: Floats, own: Floats) -> Floats:
         """Return the derivatives (n, K, 3) by each perturbed level (or nodal value), and by the initial heading."""
-        batch = self.batch
-        perturbed = settled[batch.rows] + _STEP * batch.row_change
-        first = initial[batch.perturbed_run]
-        first[:, 2] += _STEP * batch.heading_perturbed
+        batch, perturbations = self.batch, self.batch.perturbations
+        perturbed = settled[perturbations.rows] + _STEP * perturbations.row_change
+        first = initial[perturbations.run]
+        first[:, 2] += _STEP * perturbations.heading
         repeats = batch.alike(base, initial[:, 2])
         representative = batch.perturbations_of(repeats)
-        poses = batch.perturbations.predict(
+        poses = perturbations.simulation.predict(
             perturbed, self._all(own), first, runs=np.unique(representative), nodal_deviation=batch.nodal_deviation
-        ).reshape(len(batch.perturbed_run), -1, 3)
-        changes = (poses - base[batch.perturbed_run])[representative] / _STEP
-        return repeats.turned(changes, batch.perturbed_run, initial[:, 2])
+        ).reshape(len(perturbations.run), -1, 3)
+        changes = (poses - base[perturbations.run])[representative] / _STEP
+        return repeats.turned(changes, perturbations.run, initial[:, 2])

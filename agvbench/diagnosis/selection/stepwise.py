@@ -52,11 +52,13 @@ class Selector(FittedModels):
     """Fits effects to the training runs, and selects those that meet the criterion.
 
     ``extended`` is the selector of the same runs with the extended library, once it was needed. ``further_kinds`` names
-    what that library contains: by default every variant and term.
+    what that library contains: by default every variant and term. `select` computes alternatives if
+    ``finds_alternatives``.
     """
 
     criteria: ClassVar[SelectionCriteria] = SELECTION
     further_kinds: ClassVar[frozenset[str] | None] = None
+    finds_alternatives: ClassVar[bool] = True
     extended: Self | None = field(init=False, default=None)
 
     @property
@@ -95,7 +97,7 @@ class Selector(FittedModels):
             current = self.preferred(accepted)
             self.on_progress(f"{' + '.join(current.names)}: gains {base.deviance - current.deviance:.0f}")
         current, gains = self.backward_elimination(base, current, group)
-        alternatives = self.alternatives(base, current)
+        alternatives = self.alternatives(base, current) if self.finds_alternatives else {}
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}
         return Selection(base, current, alternatives, gains, rejected, self.models_fitted)
 

@@ -212,7 +212,8 @@ def _replacements(
     chosen = selection.chosen
     without = selector.without_effect(selection.base, chosen, name)
     chosen_gains = without.deviance - chosen.deviance, chosen.fit_gain_over(without)
-    others = [other for other in selector.candidates if other not in chosen.names]
+    tried = {kind.variant_of for kind in kinds}
+    others = [other for other in selector.candidates if other not in chosen.names and other in tried]
     models = {name: chosen} | selector.likely(without, chosen, others)
     for variant in kinds:
         if variant.variant_of not in {name, *others}:

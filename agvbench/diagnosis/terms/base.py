@@ -15,7 +15,9 @@ class DiscrepancyTerm(Effect):
     """A shape without a cause: the residual depends on ``covariates``, and the shape acts ``through`` a channel.
 
     ``form_of`` are effects of the library of which the term is another form: where one was selected, the term is tried
-    in its place, even if no residual is left. ``distinguished_by`` are the runs that tell them apart.
+    in its place, even if no residual is left. ``distinguished_by`` are the runs that tell them apart. ``for_windows``
+    says whether a window of free driving can have the term: not if it depends on the beginning or the end of a run, on
+    the time since the campaign began or on a number of each run.
     """
 
     relaxes: ClassVar[str] = "none: it stands for an unknown cause"
@@ -25,6 +27,7 @@ class DiscrepancyTerm(Effect):
     through: ClassVar[str]
     form_of: ClassVar[frozenset[str]] = frozenset()
     distinguished_by: ClassVar[str] = ""
+    for_windows: ClassVar[bool] = True
 
 
 def coordinate() -> Any:

@@ -72,6 +72,7 @@ class ByCampaignTime(DiscrepancyTerm):
     """A term that depends on the time since the campaign began."""
 
     covariates: ClassVar[tuple[str, ...]] = ("campaign_time_h",)
+    for_windows: ClassVar[bool] = False
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ class ByLoggedColumn(DiscrepancyTerm):
     """A term that depends on a logged column; the diagnosis reports the name of the column as covariate."""
 
     covariates: ClassVar[tuple[str, ...]] = ("logged_column",)
+    for_windows: ClassVar[bool] = False
 
 
 @dataclass(frozen=True)

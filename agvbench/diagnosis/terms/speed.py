@@ -153,6 +153,7 @@ class SpeedByRunTime(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.WHEELS
     covariates: ClassVar[tuple[str, ...]] = ("time_in_run_s",)
     through: ClassVar[str] = "speed"
+    for_windows: ClassVar[bool] = False
     longest_step_s: ClassVar[float] = 0.2
 
     share: float = parameter(unit="–", low=-0.9, high=0.9, scale=0.05)

@@ -108,6 +108,7 @@ class SteeringAtStart(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.WHEELS
     covariates: ClassVar[tuple[str, ...]] = ("time_in_run_s", "history")
     through: ClassVar[str] = "steering"
+    for_windows: ClassVar[bool] = False
     longest_step_s: ClassVar[float] = 0.1
 
     loss_s_per_m: float = parameter(unit="s/m", low=-3.0, high=3.0, scale=0.1)
@@ -135,6 +136,7 @@ class SteeringByTurnedHeading(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.WHEELS
     covariates: ClassVar[tuple[str, ...]] = ("turned_rad",)
     through: ClassVar[str] = "steering"
+    for_windows: ClassVar[bool] = False
     longest_step_s: ClassVar[float] = 0.1
     needs_steered_axles: ClassVar[bool] = True
 

@@ -138,6 +138,7 @@ class TwistAtStart(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.BODY
     covariates: ClassVar[tuple[str, ...]] = ("time_in_run_s", "history")
     through: ClassVar[str] = "turning"
+    for_windows: ClassVar[bool] = False
     longest_step_s: ClassVar[float] = 0.025
 
     twist_rad: float = parameter(unit="rad", low=-0.5, high=0.5, scale=0.02)
@@ -167,6 +168,7 @@ class TurnWhileCoasting(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.BODY
     covariates: ClassVar[tuple[str, ...]] = ("speed_mps", "time_in_run_s")
     through: ClassVar[str] = "turning"
+    for_windows: ClassVar[bool] = False
 
     curvature_per_m: float = parameter(unit="1/m", low=-50.0, high=50.0, scale=1.0)
 
@@ -188,6 +190,7 @@ class WaveByDistance(DiscrepancyTerm):
     stage: ClassVar[Stage] = Stage.BODY
     covariates: ClassVar[tuple[str, ...]] = ("distance_modulo_period_m",)
     through: ClassVar[str] = "speed, lateral motion and turning"
+    for_windows: ClassVar[bool] = False
     longest_step_s: ClassVar[float] = 0.05
 
     period_m: float = parameter(unit="m", low=0.0, high=10.0, scale=0.1)

@@ -91,12 +91,16 @@ class Simulation:
     ----------
     kinds : tuple of Effect classes
         All effects, those of the registry first.
+    further_kinds : tuple of Effect classes
+        Those that are not of the registry.
     parameter_names : tuple of str
         ``"steering_lag.time_constant_s"`` …, the order of every parameter vector.
     nulls, lower, upper, scales : ndarray, shape (p,)
         Of each parameter.
     drive, front, rear : ndarray, shape (rows,)
         Commands of each row, in the vehicle's unit.
+    command_t_s : ndarray, shape (rows,)
+        Time of the command of each row, −∞ for the first of a run: what was commanded before.
     row_starts, frame_starts : ndarray, shape (runs + 1,)
         Index of the first row and frame of each run.
     row_runs, frame_runs : ndarray, shape (rows,), (frames,)
@@ -120,7 +124,7 @@ class Simulation:
     ) -> None:
         _check_lengths(runs)
         self.geometry, self.neutral = geometry, neutral
-        self.kinds = (*effect_kinds().values(), *kinds)
+        self.kinds, self.further_kinds = (*effect_kinds().values(), *kinds), tuple(kinds)
         declared = [(kind.name, p) for kind in self.kinds for p in kind.parameters()]
         self.parameter_names = tuple(f"{name}.{p.name}" for name, p in declared)
         self.nulls, self.lower, self.upper, self.scales = (
@@ -141,8 +145,8 @@ class Simulation:
             for channel in _CHANNELS
         )
         self.t_s = _joined([run.t_s for run in runs], self.frame_starts, "t_s", ascending=True)
-        command_t_s = _joined([run.commands.t_s for run in runs], starts, "commands.t_s", ascending=True)
-        self._command_t_s = np.insert(command_t_s, starts[:-1], -np.inf)
+        given_s = _joined([run.commands.t_s for run in runs], starts, "commands.t_s", ascending=True)
+        self.command_t_s = np.insert(given_s, starts[:-1], -np.inf)
         self._from_neutral = np.column_stack([self.drive, self.front, self.rear]) - neutral
         self._started_h = np.array([run.started_h for run in runs], dtype=np.float64)
         self._logged = _logged(runs)
@@ -258,7 +262,7 @@ class Simulation:
             self._logged,
             self._from_neutral,
             np.ascontiguousarray(settled, dtype=np.float64),
-            self._command_t_s if later_s is None else self._command_t_s + later_s[self.row_runs],
+            self.command_t_s if later_s is None else self.command_t_s + later_s[self.row_runs],
             self.row_starts,
             self.t_s,
             self.frame_starts,

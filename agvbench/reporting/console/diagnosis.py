@@ -27,6 +27,7 @@ from agvbench.workflows.diagnosis_files import (
     remedies_in_words,
     sessions_in_words,
     states_in_words,
+    term_in_words,
 )
 
 _MOST_DEPENDENCES = 5
@@ -36,7 +37,8 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
     """Print the answer in plain words."""
     content = found.to_json()
     console.print(Text.assemble((str(found.verdict), "bold"), f": {found.why}"), soft_wrap=True)
-    lines = [*map(effect_in_words, found.effects), *islice(left_in_words(content), _MOST_DEPENDENCES)]
+    left = islice(left_in_words(content), _MOST_DEPENDENCES)
+    lines = [*map(effect_in_words, found.effects), *left, *term_in_words(content)]
     _say(lines, console)
     if found.held_out is not None:
         console.print()

@@ -41,6 +41,7 @@ from agvbench.workflows.diagnosis_files import (
     number,
     remedies_in_words,
     sessions_in_words,
+    term_in_words,
 )
 from agvbench.workflows.report import ReportData
 
@@ -89,7 +90,7 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     found = (_effects(content), _errors(content), *errors_by_recording(content), _states(content))
     blocks += [block for block in found if not isinstance(block, Table) or block.rows]
     said = (
-        *left_in_words(content), *fit_in_words(content), *extrapolation_in_words(content),
+        *left_in_words(content), *term_in_words(content), *fit_in_words(content), *extrapolation_in_words(content),
         *sessions_in_words(content), *remedies_in_words(content), *next_in_words(content), *shown.problems,
     )  # fmt: skip
     sentences = [plain_sentences(text) for text in said]

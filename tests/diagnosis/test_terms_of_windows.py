@@ -1,0 +1,138 @@
+"""Discrepancy terms in free driving: causes outside the library, of a vehicle that shares no code with it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from free_drives import FREE_HEADER, circling, free_runs
+from tiny_vehicle import HEADER, NEUTRAL_COMMAND, InMemory, Tiny
+
+from agvbench.diagnosis import Verdict, diagnose
+from agvbench.diagnosis.data.readings import read_windows
+from agvbench.diagnosis.data.windows import Horizon
+from agvbench.diagnosis.discrepancy.command_history import command_history
+from agvbench.diagnosis.free_driving.method import static_maps
+from agvbench.diagnosis.model.batch import Batch
+from agvbench.diagnosis.residuals.body_rates import residual_rates
+from agvbench.diagnosis.terms import TERMS
+from agvbench.types import Commands, Run
+from agvbench.vehicle.geometry import Geometry
+from agvbench.workflows.diagnosis_files import term_in_words
+
+NOT_FOR_WINDOWS = {
+    "speed_by_run_time",
+    "steering_at_start",
+    "steering_by_turned_heading",
+    "turn_while_coasting",
+    "twist_at_start",
+    "wave_by_distance",
+}
+COMPARING = "comparing terms for what no effect of the library describes"
+
+
+def diagnosed(truth: Tiny, said: list[str] | None = None):
+    runs = free_runs(truth, sessions=3, runs=2, by=circling)
+    return diagnose(InMemory(runs, FREE_HEADER), on_progress=(said if said is not None else []).append)
+
+
+@pytest.mark.parametrize(
+    ("truth", "name", "covariate", "parameters"),
+    [
+        (
+            Tiny(slow_patch=0.3),
+            "speed_in_disc",
+            "x_m",
+            {"loss": (0.3, 0.01), "x_m": (0.6, 0.02), "y_m": (0.3, 0.02), "radius_m": (0.7, 0.02)},
+        ),
+        pytest.param(
+            Tiny(pull_mps=0.02),
+            "drift_to_point",
+            "x_m",
+            {"mps": (0.02, 0.002), "x_m": (0.3, 0.05), "y_m": (-0.2, 0.05)},
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            Tiny(sag_per_rad=0.3),
+            "speed_after_steering",
+            "history",
+            {"loss_per_rad": (0.3, 0.03), "time_constant_s": (0.6, 0.06)},
+            marks=pytest.mark.slow,
+        ),
+    ],
+    ids=["slow patch", "pull to a point", "supply that sags"],
+)
+def test_a_cause_outside_the_library_is_described_and_not_named(truth, name, covariate, parameters):
+    found = diagnosed(truth)
+    assert found.verdict is Verdict.UNKNOWN
+    assert f"it depends on {covariate}, and {name} describes it" in found.why
+    term = found.provenance["empirical_term"]
+    assert term["name"] == name
+    for parameter, (value, tolerance) in parameters.items():
+        assert term["parameters"][parameter] == pytest.approx(value, abs=tolerance)
+    assert found.effects == ()
+    assert found.next_experiment is None
+    errors = found.held_out.errors["position_rms_mm"]
+    assert errors["after"] < 0.25 * errors["before"]
+    held_out = term["held_out_position_mm"]
+    assert held_out["with"] < 0.25 * held_out["without"]
+    (sentence,) = term_in_words(found.to_json())
+    assert sentence.startswith(f"{name} holds in the test windows: position error ")
+
+
+def test_no_term_is_tried_within_repeatability():
+    said: list[str] = []
+    found = diagnosed(Tiny(), said)
+    assert COMPARING not in said
+    assert "empirical_term" not in found.provenance
+    assert not list(term_in_words(found.to_json()))
+
+
+def test_an_effect_of_the_library_leaves_nothing_to_a_term():
+    said: list[str] = []
+    found = diagnosed(Tiny(steering_lag_s=0.3), said)
+    assert {effect.name for effect in found.effects} == {"steering_lag"}
+    assert "empirical_term" not in found.provenance
+
+
+@pytest.mark.parametrize("term", TERMS, ids=lambda term: term.name)
+def test_windows_have_no_terms_of_a_beginning_or_an_end(term):
+    is_of_campaign = term.covariates[0] in {"campaign_time_h", "logged_column"}
+    assert term.for_windows is not (is_of_campaign or term.name in NOT_FOR_WINDOWS)
+
+
+def test_a_term_that_does_not_hold_is_said_to_be_worse():
+    content = {
+        "provenance": {"empirical_term": {"name": "speed_in_disc", "held_out_position_mm": {"with": 9, "without": 4}}}
+    }
+    (sentence,) = term_in_words(content)
+    assert sentence == (
+        "speed_in_disc does not hold in the test windows: position error 9 mm with it, 4 mm without it (as fitted)."
+    )
+
+
+def held_and_repeated(run: Run) -> tuple[Run, Run]:
+    """Return a run whose commands are held for half a second, and the same with a row each tenth of a second."""
+    commands = run.commands
+    first = np.arange(len(commands.t_s)) // 5 * 5
+    repeated = Commands(commands.t_s, *(values[first] for values in (commands.drive, commands.front, commands.rear)))
+    return (
+        dataclasses.replace(run, commands=repeated.without_repeats()),
+        dataclasses.replace(run, commands=repeated),
+    )
+
+
+def test_the_command_history_of_windows_does_not_depend_on_rows_that_repeat_the_row_before():
+    geometry = Geometry(HEADER.front_axle_m, HEADER.rear_axle_m)
+    pairs = [held_and_repeated(run) for run in free_runs(Tiny(), sessions=2, runs=1, by=circling)]
+    histories = []
+    for runs in zip(*pairs, strict=True):
+        readings = read_windows(runs, Horizon(2.0, 1.0), NEUTRAL_COMMAND)
+        static = static_maps(readings, runs, geometry, NEUTRAL_COMMAND)
+        batch = Batch(readings, static.predictor.maps, geometry)
+        rates = residual_rates(readings, static.predictor.predict(static.parameters))
+        histories.append(dataclasses.asdict(command_history(batch, static.parameters, rates)))
+    held, repeated = histories
+    for name, values in held.items():
+        np.testing.assert_allclose(repeated[name], values, rtol=1e-9, atol=1e-12, err_msg=name)
