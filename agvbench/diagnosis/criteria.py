@@ -119,8 +119,11 @@ class SelectionCriteria:
         place. It is low, because such predictions may be several times too small.
     ``superior_share``
         An effect that is predicted to gain less than this share of what another one gains is not fitted in that step.
-        A gain that is predicted to first order is rarely more than twice too small. In free driving every effect is
-        fitted, because actuators are preferred to a latency of the camera whatever they gain.
+        A gain that is predicted to first order is rarely more than twice too small. In free driving actuators are
+        always fitted, because they are preferred to a latency of the camera whatever they gain.
+    ``likely_gain_share``
+        An effect that is predicted to gain less than this share of the least gain of an effect is not fitted. Random
+        effects of runs from rest absorb a cause, so that predictions may be several times too small: there it is zero.
     ``group_by_gain``
         Whether an effect of a group that was fitted together is judged by ``min_gain`` alone. It was not searched for
         among many, and a time constant of which only a lower bound is known has no finite standard error.
@@ -141,6 +144,7 @@ class SelectionCriteria:
     trimmed_share: float = 0.05
     likely_share: float = 0.1
     superior_share: float = 0.5
+    likely_gain_share: float = 0.0
     group_by_gain: bool = False
     wald_alpha: float = 1e-4
     by_likelihood_ratio: bool = False
@@ -390,7 +394,7 @@ MAPS = MapCriteria()
 FIT = FitCriteria()
 SELECTION = SelectionCriteria()
 FREE_DRIVING = SelectionCriteria(
-    min_relative_change=0.3, trimmed_share=0.0, superior_share=0.0, group_by_gain=True, by_likelihood_ratio=True
+    min_relative_change=0.3, trimmed_share=0.0, likely_gain_share=0.5, group_by_gain=True, by_likelihood_ratio=True
 )
 """Criteria for windows of free driving. Their residuals are mostly systematic, so that a small change of the prediction
 is no evidence; blocks of fast driving may be few, so that only one block is left out at each end. Unplanned

@@ -139,7 +139,9 @@ def _track(run: Run, began_s: float, *, is_differential: bool) -> _Track:
     heading = 0.5 * (poses[first, 2] + poses[last, 2])
     forward = np.cos(heading) * moved[:, 0] + np.sin(heading) * moved[:, 1]
     speed = np.ones(len(first)) if is_differential else forward
-    track = _Track(run.commands, t_s[first], length_s, speed, moved[:, 2], run.started_s - began_s + t_s[first])
+    track = _Track(
+        run.commands.without_repeats(), t_s[first], length_s, speed, moved[:, 2], run.started_s - began_s + t_s[first]
+    )
     return track.select(np.abs(speed) > SESSION_CLOCK.min_speed_mps)
 
 

@@ -63,24 +63,30 @@ class Search:
         """Return the simulated runs of designs from all of their starts."""
         return simulated_readings(tried, [self.starts(d) for d in tried], self.noise)
 
+    def _batch(self, readings: Readings) -> Batch:
+        """Return simulated runs, packed for the chosen model and for its alternatives."""
+        of_data = self.chosen.predictor.batch
+        return Batch(readings, of_data.maps, self.geometry, kinds=of_data.kinds)
+
     def pair_scores(self, pairs: Sequence[tuple[Alternative, Alternative]], tried: Sequence[Design]) -> Floats:
         """Return the evidence per repeat (pairs, designs); zero for designs that were not evaluated.
 
         Models are linearised only on the designs where their predictions differ most.
         """
         readings = self.readings(tried)
+        every = self._batch(readings)
         fits = {id(r.fit): r.fit for pair in pairs for r in pair}
-        poses = {key: predictor_like(f, readings, self.geometry).predict(f.parameters) for key, f in fits.items()}
+        poses = {key: Predictor(every, f.predictor.effects).predict(f.parameters) for key, f in fits.items()}
         out = np.zeros((len(pairs), len(tried)))
         for k, (one, other) in enumerate(pairs):
             difference_of_pair = poses[id(one.fit)] - poses[id(other.fit)]
             approximate = self._approximate_evidence(difference_of_pair, len(tried))
             chosen = np.sort(np.argsort(-approximate, kind="stable")[:_EVALUATED])
-            some = self.readings([tried[i] for i in chosen])
+            some = self._batch(self.readings([tried[i] for i in chosen]))
             rows = np.isin(readings.group, chosen)
             gains = []
             for wrong, difference in ((one.fit, difference_of_pair[rows]), (other.fit, -difference_of_pair[rows])):
-                new = information(wrong, predictor_like(wrong, some, self.geometry), wrong.parameters, difference)
+                new = information(wrong, Predictor(some, wrong.predictor.effects), wrong.parameters, difference)
                 known = wrong.information.total
                 gains.append(evidence(known, new, DESIGN.min_repeats) / DESIGN.min_repeats)
             out[k, chosen] = np.minimum(*gains) * _limited_share(difference_of_pair, len(tried))[chosen] ** 2
@@ -90,8 +96,7 @@ class Search:
         """Return the expected standard errors over scales (len(flat), designs); large for designs not evaluated."""
         chosen = self.chosen
         every = self.readings(tried)
-        maps, kinds = chosen.predictor.maps, chosen.predictor.batch.kinds
-        batch = Batch(every, maps, self.geometry, kinds=kinds)
+        batch = self._batch(every)
         out = np.full((len(flat), len(tried)), np.inf)
         no_random_effects = np.zeros((len(every), len(RANDOM_EFFECTS)))
         for k, item in enumerate(flat):
@@ -105,7 +110,7 @@ class Search:
             if not len(visible):
                 continue  # no design shows it
             evaluated = visible[np.unique(np.linspace(0, len(visible) - 1, _EVALUATED).round().astype(int))]
-            some = Batch(self.readings([tried[i] for i in evaluated]), maps, self.geometry, kinds=kinds)
+            some = self._batch(self.readings([tried[i] for i in evaluated]))
             change = item.scale * slopes[..., item.at]
             share = _limited_share(change, len(tried))[evaluated]
             out[k, evaluated] = stderr_ratios(chosen, [item], [Predictor(some, names)], repeats)[0] / share
@@ -134,10 +139,10 @@ class Search:
         self, pairs: Sequence[tuple[Alternative, Alternative]], design: Design, gains: Floats
     ) -> tuple[Discrimination, ...]:
         """Return how well a design discriminates each pair."""
-        readings = self.readings([design])
+        batch = self._batch(self.readings([design]))
         out = []
         for (one, other), gain in zip(pairs, gains, strict=True):
-            a, b = (predictor_like(r.fit, readings, self.geometry).predict(r.fit.parameters) for r in (one, other))
+            a, b = (Predictor(batch, r.fit.predictor.effects).predict(r.fit.parameters) for r in (one, other))
             difference = a - b
             out.append(
                 Discrimination(

@@ -234,7 +234,7 @@ class WindowConclusion:
         """Return for each effect whether it was selected, and the position error with and without it.
 
         Both are those of models as fitted, because estimates from earlier windows take the place of a missing effect.
-        An effect without predicted gain was not fitted: its gain is zero, and it has no error. One that was not
+        An effect with little predicted gain was not fitted: its gain is zero, and it has no error. One that was not
         selected is beside the effects that were selected before a discrepancy term.
         """
         names, out = self.selection.chosen.names, {}
@@ -294,7 +294,7 @@ def _above(held_out: HeldOut, times: float) -> bool:
 
 
 def _verdict(
-    effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool, term: TermSelection | None
+    effects: tuple[NamedEffect, ...], rest: list[Dependence], far: bool, term: TermSelection | None = None
 ) -> tuple[Verdict, str]:
     if rest:
         described = f", and {term.names} describes it in the training windows" if term else ""

@@ -28,6 +28,7 @@ from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
 from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
 
 _RANKED_WINDOWS = 100
+_MOST_MIMICKING = 3
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class SelectionWithTerm:
 def with_describing_term(selection: Selection, selector: WindowSelector) -> SelectionWithTerm | None:
     """Return the selection with the term that predicts best, and with those of its effects that are needed beside it.
 
-    None if no term meets the criterion. No term is tried within repeatability.
+    None if no term meets the criterion. No term is tried unless the model is inadequate.
     """
     if not is_inadequate(selection.chosen):
         return None
@@ -95,15 +96,16 @@ def _with_effects(
 def _starts(selection: Selection, selector: WindowSelector) -> dict[tuple[str, ...], list[Start]]:
     """Return the terms to fit beside the selected effects, and those to fit beside none, by the names of the effects.
 
-    Terms are ranked by some of the windows. An effect may mimic the unknown cause, and leave nothing to a term: beside
-    no effect, a term must be predicted to gain a share of what the effects gain.
+    Terms are ranked by some of the windows. Up to three effects may mimic an unknown cause and leave nothing to a term:
+    beside no effect, a term must be predicted to gain a share of what the effects gain.
     """
     batch = selector.batch
     some = batch.readings.select(thinned(np.arange(len(batch.readings)), _RANKED_WINDOWS))
     fewer = Batch(some, batch.maps, batch.geometry, batch.nodal_deviation, batch.autocorrelation_time, EXTENDED_LIBRARY)
     ranking, share = replace(selector, test_batch=None).for_batch(fewer), len(some) / len(batch.readings)
     found = {}
-    for model in (selection.chosen, selection.base) if selection.gains else (selection.chosen,):
+    may_mimic = 0 < len(selection.gains) <= _MOST_MIMICKING
+    for model in (selection.chosen, selection.base) if may_mimic else (selection.chosen,):
         least = DISCREPANCY.min_share_of_effects * selection.chosen.fit_gain_over(model)
         root = ranking.refitted(model)
         starts = [] if root is None else _ranked(ranking, root, share * selector.min_gain)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
 import numpy as np
 
-from agvbench.diagnosis.criteria import FREE_DRIVING, SelectionCriteria
+from agvbench.diagnosis.criteria import FREE_DRIVING, VARIANT, SelectionCriteria
 from agvbench.diagnosis.discrepancy.stepwise import TERM_NAMES
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -49,8 +50,19 @@ class WindowSelector(Selector):
     criteria: ClassVar[SelectionCriteria] = FREE_DRIVING
     further_kinds: ClassVar[frozenset[str] | None] = frozenset({SERVOS_DELAY, *DRIVES})
     finds_alternatives: ClassVar[bool] = False
+    always_fitted: ClassVar[frozenset[str]] = frozenset(ACTUATORS)
     test_batch: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
+
+    def likely(self, without: ScoredModel, current: ScoredModel, others: Iterable[str]) -> dict[str, ScoredModel]:
+        """Do as `Selector.likely`; what fits much worse than `current` is not fitted to the end.
+
+        No random effects of windows change its fit in further steps.
+        """
+        least = self.criteria.likely_share * current.fit_gain_over(without)
+        likely = [name for name in others if self.predicted_gain(without, name) >= least]
+        max_loss = current.fit.total_loss + VARIANT.max_fit_loss
+        return {name: self.with_effect(without, name, max_loss=max_loss) for name in likely}
 
     def with_alternatives(self, selection: Selection) -> Selection:
         """Return a selection with the alternatives of its effects."""

@@ -53,7 +53,7 @@ class Variation:
         components of the maps are left out: what the training windows determine varies little.
         """
         m, f = len(model.quantities), sum(quantity.varies_within for quantity in model.quantities)
-        residuals = residuals.by_first(m)
+        residuals = residuals.by_first(m).of_recordings(training[residuals.order])
         used = training[residuals.order] & np.isfinite(residuals.residual).all(axis=1)
         between = np.array([_TYPICAL[quantity.unit] for quantity in model.quantities])
         usual = np.append(_usual_lack(residuals, used), [VARYING.time_error_s, VARYING.at_beginning])

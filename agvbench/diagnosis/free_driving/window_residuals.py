@@ -5,7 +5,7 @@ Residuals are those at half the horizon, in axes of the predicted pose there. Th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,12 @@ class WindowResiduals:
     def by_first(self, count: int) -> WindowResiduals:
         """Return these residuals with derivatives by the first `count` values only."""
         return replace(self, slopes=np.ascontiguousarray(self.slopes[..., :count]))
+
+    def of_recordings(self, chosen: NDArray[np.bool_]) -> WindowResiduals:
+        """Return the residuals of those recordings of which any window is `chosen` (W,), in the order."""
+        recording = np.cumsum(self.restarts)
+        kept = np.isin(recording, recording[chosen])
+        return WindowResiduals(*(getattr(self, field.name)[kept] for field in fields(self)))
 
     @classmethod
     def of(cls, model: VaryingModel) -> WindowResiduals:

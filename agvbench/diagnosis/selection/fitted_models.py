@@ -174,17 +174,21 @@ class FittedModels:
             return without  # the fit diverged
         return min(without, from_base, key=lambda model: model.fit.total_loss)
 
-    def with_effect(self, current: ScoredModel, name: str, candidate: Candidate | None = None) -> ScoredModel:
+    def with_effect(
+        self, current: ScoredModel, name: str, candidate: Candidate | None = None, *, max_loss: float = math.inf
+    ) -> ScoredModel:
         """Return `current` with the effect called `name`, fitted from the best of its initial values.
 
-        These are the initial values of `candidate`, or of the default candidate.
+        These are the initial values of `candidate`, or of the default candidate. A fit that is not expected to reach
+        `max_loss` is not finished.
         """
         names = (*current.names, name)
         starts = current.starts if candidate is None else current.starts | candidate.key
         if found := self._known.get(Request(frozenset(names), starts)):
             return found
         try:
-            return self._with_effect(current, self._predictor(names), candidate or default_candidate(name), starts)
+            tried = candidate or default_candidate(name)
+            return self._with_effect(current, self._predictor(names), tried, starts, max_loss)
         except np.linalg.LinAlgError:
             # A fit that diverges counts as no effect.
             return replace(current, names=names)
@@ -204,7 +208,7 @@ class FittedModels:
         return self._gains[which]
 
     def _with_effect(
-        self, current: ScoredModel, predictor: Predictor, candidate: Candidate, starts: Starts
+        self, current: ScoredModel, predictor: Predictor, candidate: Candidate, starts: Starts, max_loss: float
     ) -> ScoredModel:
         names, now = predictor.effects, current.fit
         bounds = bounds_of(names)
@@ -222,6 +226,8 @@ class FittedModels:
             predicted_gain < FIT.large_predicted_gain
             and now.total_loss - preliminary.total_loss < FIT.min_predicted_gain
         ):
+            return self.unfinished(preliminary, starts)
+        if preliminary.total_loss - preliminary.decrement > max_loss:
             return self.unfinished(preliminary, starts)
         return self.score(
             names, preliminary.parameters, preliminary, starts=starts, patient=is_likely and candidate.patient

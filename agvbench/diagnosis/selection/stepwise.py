@@ -53,12 +53,14 @@ class Selector(FittedModels):
 
     ``extended`` is the selector of the same runs with the extended library, once it was needed. ``further_kinds`` names
     what that library contains: by default every variant and term. `select` computes alternatives if
-    ``finds_alternatives``.
+    ``finds_alternatives``. ``always_fitted`` are effects that are fitted in every step, whatever they are predicted to
+    gain.
     """
 
     criteria: ClassVar[SelectionCriteria] = SELECTION
     further_kinds: ClassVar[frozenset[str] | None] = None
     finds_alternatives: ClassVar[bool] = True
+    always_fitted: ClassVar[frozenset[str]] = frozenset()
     extended: Self | None = field(init=False, default=None)
 
     @property
@@ -104,7 +106,8 @@ class Selector(FittedModels):
     def _with_one_more(self, current: ScoredModel) -> tuple[dict[str, ScoredModel], list[ScoredModel]]:
         """Return `current` with each further candidate, in the order of predicted gains, and those that improve it.
 
-        What is predicted to gain much less than another one does gain is left to the next step.
+        What is predicted to gain much less than another one does gain is left to the next step. What is predicted to
+        gain too little is not fitted. Both hold unless it is always fitted.
         """
         names = self.further(current)
         predicted = {name: self.predicted_gain(current, name) for name in names}
@@ -112,8 +115,9 @@ class Selector(FittedModels):
         accepted: list[ScoredModel] = []
         most = 0.0
         for name in sorted(names, key=lambda name: -predicted[name]):
-            if accepted and predicted[name] < self.criteria.superior_share * most:
-                break
+            least = max(self.criteria.likely_gain_share * self.min_gain, self.criteria.superior_share * most)
+            if predicted[name] < least and cause_of(name) not in self.always_fitted:
+                continue
             larger[name] = model = self.with_effect(current, name)
             if self.improves(current, model):
                 accepted.append(model)
