@@ -119,8 +119,8 @@ class SelectionCriteria:
         place. It is low, because such predictions may be several times too small.
     ``superior_share``
         An effect that is predicted to gain less than this share of what another one gains is not fitted in that step.
-        A gain that is predicted to first order is rarely more than twice too small. In free driving actuators are
-        always fitted, because they are preferred to a latency of the camera whatever they gain.
+        A gain that is predicted to first order is rarely more than twice too small. In free driving it is zero: a lag
+        and a slip resemble each other, and the one that gains more may be predicted to gain less than half.
     ``likely_gain_share``
         An effect that is predicted to gain less than this share of the least gain of an effect is not fitted. Random
         effects of runs from rest absorb a cause, so that predictions may be several times too small: there it is zero.
@@ -394,7 +394,12 @@ MAPS = MapCriteria()
 FIT = FitCriteria()
 SELECTION = SelectionCriteria()
 FREE_DRIVING = SelectionCriteria(
-    min_relative_change=0.3, trimmed_share=0.0, likely_gain_share=0.5, group_by_gain=True, by_likelihood_ratio=True
+    min_relative_change=0.3,
+    trimmed_share=0.0,
+    superior_share=0.0,
+    likely_gain_share=0.5,
+    group_by_gain=True,
+    by_likelihood_ratio=True,
 )
 """Criteria for windows of free driving. Their residuals are mostly systematic, so that a small change of the prediction
 is no evidence; blocks of fast driving may be few, so that only one block is left out at each end. Unplanned

@@ -107,7 +107,7 @@ class Selector(FittedModels):
         """Return `current` with each further candidate, in the order of predicted gains, and those that improve it.
 
         What is predicted to gain much less than another one does gain is left to the next step. What is predicted to
-        gain too little is not fitted. Both hold unless it is always fitted.
+        gain too little is not fitted. Both hold but for effects that are always fitted.
         """
         names = self.further(current)
         predicted = {name: self.predicted_gain(current, name) for name in names}
