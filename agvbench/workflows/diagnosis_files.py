@@ -131,16 +131,18 @@ def left_in_words(content: Mapping[str, Any]) -> Iterator[str]:
 
 
 def term_in_words(content: Mapping[str, Any]) -> Iterator[str]:
-    """Yield whether the discrepancy term of free driving holds in the test windows."""
+    """Yield the parameters of the discrepancy term of free driving, and whether it holds in the test windows."""
     term = mapping(mapping(content.get("provenance")).get("empirical_term"))
     errors = mapping(term.get("held_out_position_mm"))
     now, without = number(errors.get("with")), number(errors.get("without"))
-    if not math.isnan(now + without):
-        holds = "holds" if now < without else "does not hold"
-        yield (
-            f"{term.get('name')} {holds} in the test windows: position error {now:.0f} mm with it, {without:.0f} mm "
-            "without it (as fitted)."
-        )
+    if math.isnan(now + without):
+        return
+    values = ", ".join(f"{name} = {number(value):.3g}" for name, value in mapping(term.get("parameters")).items())
+    holds = "holds" if now < without else "does not hold"
+    yield f"{term.get('name')}: {values}."
+    yield (
+        f"It {holds} in the test windows: position error {now:.0f} mm with it, {without:.0f} mm without it (as fitted)."
+    )
 
 
 def fit_in_words(content: Mapping[str, Any]) -> Iterator[str]:

@@ -77,8 +77,9 @@ def test_a_cause_outside_the_library_is_described_and_not_named(truth, name, cov
     assert errors["after"] < 0.25 * errors["before"]
     held_out = term["held_out_position_mm"]
     assert held_out["with"] < 0.25 * held_out["without"]
-    (sentence,) = term_in_words(found.to_json())
-    assert sentence.startswith(f"{name} holds in the test windows: position error ")
+    shape, holds = term_in_words(found.to_json())
+    assert shape.startswith(f"{name}: {next(iter(parameters))} = ")
+    assert holds.startswith("It holds in the test windows: position error ")
 
 
 def test_no_term_is_tried_within_repeatability():
@@ -103,13 +104,15 @@ def test_windows_have_no_terms_of_a_beginning_or_an_end(term):
 
 
 def test_a_term_that_does_not_hold_is_said_to_be_worse():
-    content = {
-        "provenance": {"empirical_term": {"name": "speed_in_disc", "held_out_position_mm": {"with": 9, "without": 4}}}
+    term = {
+        "name": "speed_in_disc",
+        "parameters": {"loss": 0.3012, "radius_m": 1},
+        "held_out_position_mm": {"with": 9, "without": 4},
     }
-    (sentence,) = term_in_words(content)
-    assert sentence == (
-        "speed_in_disc does not hold in the test windows: position error 9 mm with it, 4 mm without it (as fitted)."
-    )
+    assert list(term_in_words({"provenance": {"empirical_term": term}})) == [
+        "speed_in_disc: loss = 0.301, radius_m = 1.",
+        "It does not hold in the test windows: position error 9 mm with it, 4 mm without it (as fitted).",
+    ]
 
 
 def held_and_repeated(run: Run) -> tuple[Run, Run]:
