@@ -16,7 +16,7 @@ from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.selection.candidates import candidates
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.variants import candidates_for
-from agvbench.effects.variants import effect_variants
+from agvbench.effects.variants import cause_of, effect_variants
 from agvbench.vehicle.geometry import Geometry
 
 TRUTH = Tiny(ramp_forward_mps2=0.25, ramp_backward_mps2=0.25, coast_s=0.3, is_ramp_of_force=True)
@@ -79,3 +79,12 @@ def test_an_alternative_has_another_equation_where_that_of_the_library_predicts_
     other = swapped(chosen, "speed_lag", "speed_lag", candidates(chosen.predictor.batch.geometry))
     assert other.predictor.effects == ("speed_lag_coasting",)
     assert other.total_loss == pytest.approx(chosen.total_loss, abs=1.0)
+
+
+def test_the_gain_of_every_effect_that_was_not_selected_is_listed_whether_it_was_fitted_or_not(selector):
+    selection = selector.select()
+    causes = {cause_of(name) for name in selection.chosen.names}
+    assert {*selection.rejected} | causes == {*selector.candidates}
+    unlikely = [name for name in selection.rejected if selector.known((*selection.chosen.names, name)) is None]
+    assert unlikely
+    assert all(selection.rejected[name] == 0.0 for name in unlikely)

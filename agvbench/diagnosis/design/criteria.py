@@ -66,10 +66,14 @@ def _run(commands: object, repeat: int) -> Run:
     return Run("", "free", "", "calibrated", repeat, NO_TARGET, 0.0, "ok", "", commands, Frames.empty())  # type: ignore[arg-type]
 
 
+def batch_like(fitted: Fit, readings: Readings, geometry: Geometry) -> Batch:
+    """Return other runs packed for `fitted`, and for models with other effects."""
+    return Batch(readings, fitted.predictor.maps, geometry, kinds=fitted.predictor.batch.kinds)
+
+
 def predictor_like(fitted: Fit, readings: Readings, geometry: Geometry) -> Predictor:
     """Return the predictor of other runs with the maps and effects of `fitted`."""
-    batch = Batch(readings, fitted.predictor.maps, geometry, kinds=fitted.predictor.batch.kinds)
-    return Predictor(batch, fitted.predictor.effects)
+    return Predictor(batch_like(fitted, readings, geometry), fitted.predictor.effects)
 
 
 def starts_within(path: Floats, workspace: Workspace, geometry: Geometry) -> list[Pose] | None:

@@ -11,6 +11,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.design.alternatives import Alternative
 from agvbench.diagnosis.design.criteria import (
     HEADINGS_RAD,
+    batch_like,
     evidence,
     information,
     predictor_like,
@@ -65,8 +66,7 @@ class Search:
 
     def _batch(self, readings: Readings) -> Batch:
         """Return simulated runs, packed for the chosen model and for its alternatives."""
-        of_data = self.chosen.predictor.batch
-        return Batch(readings, of_data.maps, self.geometry, kinds=of_data.kinds)
+        return batch_like(self.chosen, readings, self.geometry)
 
     def pair_scores(self, pairs: Sequence[tuple[Alternative, Alternative]], tried: Sequence[Design]) -> Floats:
         """Return the evidence per repeat (pairs, designs); zero for designs that were not evaluated.

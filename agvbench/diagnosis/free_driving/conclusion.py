@@ -112,9 +112,8 @@ class WindowConclusion:
         held_out = self._held_out(before, poses, perturbed)
         # Many windows make even small structure significant: within repeatability it needs no cause.
         rest = self._dependences(poses) if _above(held_out, RESIDUAL.within_repeatability) else []
-        far = exceeds_repeatability(
-            self.assessment.select(self.held), poses[self.held], perturbed[self.held], RESIDUAL.far_above_noise
-        )
+        tested = self._tested.readings
+        far = exceeds_repeatability(tested, poses[self.held], perturbed[self.held], RESIDUAL.far_above_noise)
         term = self.term
         rest = with_terms_first(rest, term) if term else rest
         verdict, why = with_contradictions(*_verdict(effects, rest, far, term), checks)
@@ -138,7 +137,7 @@ class WindowConclusion:
     def _fit_provenance(self, horizon: Horizon, predicted: dict[str, Floats], perturbed: Floats) -> dict[str, object]:
         """Return the provenance of the fit, with the errors of each predictor and each effect."""
         batch, neutral = self.selector.batch, self.context.header.neutral
-        ranges = command_ranges(batch.readings, self.assessment.select(self.held), neutral)
+        ranges = command_ranges(batch.readings, self._tested.readings, neutral)
         beyond = beyond_range(self.assessment, ranges, neutral)
         errors = WindowErrors(self.assessment, predicted, perturbed, self.context.seed)
         return {
@@ -210,11 +209,10 @@ class WindowConclusion:
 
     @cached_property
     def _every(self) -> Batch:
-        batch = self.selection.chosen.fit.predictor.batch
-        return Batch(self.readings, batch.maps, self.context.geometry, batch.nodal_deviation, kinds=batch.kinds)
+        return self.selection.chosen.fit.predictor.batch.repacked(self.readings)
 
     def _held_out(self, before: Floats, after: Floats, perturbed: Floats) -> HeldOut:
-        kept = self.assessment.select(self.held)
+        kept = self._tested.readings
         least = repeatability_squares(kept, perturbed[self.held])
         was, now = squares(kept, before[self.held]), squares(kept, after[self.held])
         errors = {
@@ -256,8 +254,7 @@ class WindowConclusion:
     @cached_property
     def _tested(self) -> Batch:
         """The test windows that are predicted here."""
-        batch, tested = self._every, self.assessment.select(self.held)
-        return Batch(tested, batch.maps, batch.geometry, batch.nodal_deviation, kinds=batch.kinds)
+        return self._every.repacked(self.assessment.select(self.held))
 
     def _error_of(self, model: ScoredModel | None) -> float | None:
         """Return the position error of a model as fitted in the test windows [mm], or None without a model."""

@@ -18,7 +18,6 @@ from agvbench.diagnosis.discrepancy.screening import Start
 from agvbench.diagnosis.free_driving.errors import exceeds_repeatability
 from agvbench.diagnosis.free_driving.predictors import change_by_speed_error
 from agvbench.diagnosis.free_driving.selection import WindowSelector
-from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.selection.actuators import ACTUATORS
 from agvbench.diagnosis.selection.candidates import applies
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
@@ -88,8 +87,8 @@ def _with_effects(
     An effect that was selected without the term may only mimic the unknown cause.
     """
     for name in selection.gains:
-        larger = extended.with_effect(model, name) if name not in model.names else model
-        model = larger if larger is not model and extended.improves(model, larger) else model
+        if name not in model.names and extended.improves(model, larger := extended.with_effect(model, name)):
+            model = larger
     return extended.backward_elimination(selection.base, model, ACTUATORS)
 
 
@@ -101,8 +100,8 @@ def _starts(selection: Selection, selector: WindowSelector) -> dict[tuple[str, .
     """
     batch = selector.batch
     some = batch.readings.select(thinned(np.arange(len(batch.readings)), _RANKED_WINDOWS))
-    fewer = Batch(some, batch.maps, batch.geometry, batch.nodal_deviation, batch.autocorrelation_time, EXTENDED_LIBRARY)
-    ranking, share = replace(selector, test_batch=None).for_batch(fewer), len(some) / len(batch.readings)
+    ranking = replace(selector, test_batch=None).for_batch(batch.repacked(some, kinds=EXTENDED_LIBRARY))
+    share = len(some) / len(batch.readings)
     found = {}
     may_mimic = 0 < len(selection.gains) <= _MOST_MIMICKING
     for model in (selection.chosen, selection.base) if may_mimic else (selection.chosen,):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
@@ -54,15 +53,9 @@ class WindowSelector(Selector):
     test_batch: Batch | None = None
     extrapolating: set[str] = field(default_factory=set)
 
-    def likely(self, without: ScoredModel, current: ScoredModel, others: Iterable[str]) -> dict[str, ScoredModel]:
-        """Do as `Selector.likely`; what fits much worse than `current` is not fitted to the end.
-
-        No random effects of windows change its fit in further steps.
-        """
-        least = self.criteria.likely_share * current.fit_gain_over(without)
-        likely = [name for name in others if self.predicted_gain(without, name) >= least]
-        max_loss = current.fit.total_loss + VARIANT.max_fit_loss
-        return {name: self.with_effect(without, name, max_loss=max_loss) for name in likely}
+    def max_loss_of_likely(self, current: ScoredModel) -> float:
+        """Return a loss that is not much larger than that of `current`: windows have no random effects."""
+        return current.fit.total_loss + VARIANT.max_fit_loss
 
     def with_alternatives(self, selection: Selection) -> Selection:
         """Return a selection with the alternatives of its effects."""

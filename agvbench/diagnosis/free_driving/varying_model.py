@@ -22,6 +22,13 @@ _CLOCK, _BODY = "clock", "body"
 _STEP, _STEP_S = 1e-3, 0.02
 
 
+def in_turned_axes(changes: Floats, angle: Floats) -> Floats:
+    """Return differences of poses (…, 3) in axes that are turned by `angle` (…)."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, turn = np.moveaxis(changes, -1, 0)
+    return np.stack([c * x + s * y, c * y - s * x, turn], axis=-1)
+
+
 @dataclass(frozen=True)
 class Quantity:
     """What may vary: the offset or the gain of a channel's static map, or the offset of the clock or the rigid body.
@@ -129,10 +136,9 @@ class VaryingModel:
 
         The path turns about its beginning. The measured change of heading is that of the vehicle.
         """
-        along, across = (np.cos(angle) - 1.0)[:, None], np.sin(angle)[:, None]
-        x, y = np.moveaxis(poses[..., :2] - self.predictor.readings.start[:, None, :2], -1, 0)
-        change = np.stack([along * x + across * y, along * y - across * x, np.zeros_like(x)], axis=-1)
-        return np.asarray(poses + change)
+        away = poses - self.predictor.readings.start[:, None]
+        # Without a turn the poses stay exactly as they are.
+        return np.asarray(poses + (in_turned_axes(away, angle[:, None]) - away))
 
     def _change(self, settled: Floats, quantity: Quantity, of_row: Floats) -> None:
         """Change angles and speeds of every row (rows, 3) by the value `of_row` (rows,) of a quantity of a map."""

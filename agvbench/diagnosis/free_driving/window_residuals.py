@@ -14,7 +14,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.window_splits import _initial_states
 from agvbench.diagnosis.data.windows import DIFFERENTIAL_HISTORY_S, HISTORY_S
 from agvbench.diagnosis.free_driving.errors import REPORTED_SAMPLES
-from agvbench.diagnosis.free_driving.varying_model import VaryingModel
+from agvbench.diagnosis.free_driving.varying_model import VaryingModel, in_turned_axes
 from agvbench.types import Floats
 
 _SAMPLE = REPORTED_SAMPLES[0]
@@ -64,7 +64,7 @@ class WindowResiduals:
         order = np.lexsort((begins_s, states.recording))
         recording = states.recording[order]
         elapsed_s = np.nan_to_num(readings.t_s - states.t_s[:, None])
-        residual = _turned(readings.poses[:, _SAMPLE] - poses[:, _SAMPLE], poses[:, _SAMPLE, 2])
+        residual = in_turned_axes(readings.poses[:, _SAMPLE] - poses[:, _SAMPLE], poses[:, _SAMPLE, 2])
         # In a run's first second neither the motion filter nor the model of the actuators knows what was before.
         residual[states.t_s < _UNCERTAIN_S] = np.nan
         of_windows = (begins_s, begins_s + elapsed_s[:, _SAMPLE], residual, _slopes(model), _noise(readings, elapsed_s))
@@ -82,14 +82,7 @@ def _slopes(model: VaryingModel) -> Floats:
     """Return the derivatives (W, 3, m + r) of poses by what differs between recordings."""
     poses = model.as_fitted[:, _SAMPLE]
     changes = [model.poses(np.tile(step, (len(poses), 1)))[:, _SAMPLE] - poses for step in np.diag(model.steps)]
-    return np.stack([_turned(change, poses[:, 2]) for change in changes], axis=-1) / model.steps
-
-
-def _turned(changes: Floats, heading: Floats) -> Floats:
-    """Return differences of poses (W, 3) in axes that are turned by `heading` (W,)."""
-    c, s = np.cos(heading), np.sin(heading)
-    x, y, turn = changes.T
-    return np.column_stack([c * x + s * y, c * y - s * x, turn])
+    return np.stack([in_turned_axes(change, poses[:, 2]) for change in changes], axis=-1) / model.steps
 
 
 def _noise(readings: Readings, elapsed_s: Floats) -> Floats:

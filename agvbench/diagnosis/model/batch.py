@@ -84,12 +84,19 @@ class Batch:
         turns = driven | (self.commands["front"] != self.maps.neutral.front)
         return {"drive": driven, "front": turns if self.geometry.is_differential else always, "rear": always}
 
-    def repacked(self, *, kinds: Sequence[type[Effect]] | None = None, preset: bool | None = None) -> Batch:
-        """Return this batch with other effects outside the library, or another hypothesis on the initial steering.
+    def repacked(
+        self,
+        readings: Readings | None = None,
+        *,
+        kinds: Sequence[type[Effect]] | None = None,
+        preset: bool | None = None,
+    ) -> Batch:
+        """Return this batch with other runs, effects outside the library, or hypothesis on the initial steering.
 
         `preset` is that of `Readings`. What is not given stays as it is.
         """
-        readings = self.readings if preset is None else replace(self.readings, preset=preset)
+        readings = self.readings if readings is None else readings
+        readings = readings if preset is None else replace(readings, preset=preset)
         kinds, level = self.kinds if kinds is None else kinds, self.nodal_deviation
         return Batch(readings, self.maps, self.geometry, level, self.autocorrelation_time, kinds)
 

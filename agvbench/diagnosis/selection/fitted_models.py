@@ -191,7 +191,12 @@ class FittedModels:
             return self._with_effect(current, self._predictor(names), tried, starts, max_loss)
         except np.linalg.LinAlgError:
             # A fit that diverges counts as no effect.
-            return replace(current, names=names)
+            return self.unfitted(current, name)
+
+    @staticmethod
+    def unfitted(current: ScoredModel, name: str) -> ScoredModel:
+        """Return `current` with an effect that is not fitted: equal to the model without it, and never selected."""
+        return replace(current, names=(*current.names, name))
 
     def predicted_gain(self, current: ScoredModel, name: str) -> float:
         """Return the predicted gain of the effect `name` beside `current`, to first order, from its best start."""
@@ -215,7 +220,7 @@ class FittedModels:
         predicted_gains = self._predicted_gains(current, predictor, candidate)
         predicted_gain = max(*predicted_gains, candidate.expected_gain)
         if predicted_gain < FIT.min_predicted_gain:
-            return replace(current, names=names)  # equal to the model without the effect: never selected
+            return self.unfitted(current, candidate.name)
         ordered = [candidate.starts[k] for k in np.argsort(predicted_gains)[::-1]]
         is_likely = candidate.screened and predicted_gain > FIT.large_predicted_gain
         preliminary = self._preliminary_fit(

@@ -107,7 +107,7 @@ class Selector(FittedModels):
         """Return `current` with each further candidate, in the order of predicted gains, and those that improve it.
 
         What is predicted to gain much less than another one does gain is left to the next step. What is predicted to
-        gain too little is not fitted. Both hold but for effects that are always fitted.
+        gain too little is not fitted.
         """
         names = self.further(current)
         predicted = {name: self.predicted_gain(current, name) for name in names}
@@ -115,14 +115,21 @@ class Selector(FittedModels):
         accepted: list[ScoredModel] = []
         most = 0.0
         for name in sorted(names, key=lambda name: -predicted[name]):
-            least = max(self.criteria.likely_gain_share * self.min_gain, self.criteria.superior_share * most)
-            if predicted[name] < least and cause_of(name) not in self.always_fitted:
+            if accepted and predicted[name] < self.criteria.superior_share * most:
+                break
+            if self._is_unlikely(name, predicted[name]):
+                larger[name] = self.unfitted(current, name)
                 continue
             larger[name] = model = self.with_effect(current, name)
             if self.improves(current, model):
                 accepted.append(model)
                 most = max(most, model.gain_over(current))
         return larger, accepted
+
+    def _is_unlikely(self, name: str, predicted: float) -> bool:
+        """Return whether too little gain of an effect is predicted to fit it."""
+        share = self.criteria.likely_gain_share
+        return share > 0.0 and predicted < share * self.min_gain and cause_of(name) not in self.always_fitted
 
     def is_improvable(self, current: ScoredModel) -> bool:
         """Return whether a further candidate improves a model; those that are predicted to gain too little do not."""
@@ -241,8 +248,16 @@ class Selector(FittedModels):
 
         They are predicted to gain less than `likely_share` of what `current` gains over `without`.
         """
-        least = self.criteria.likely_share * current.fit_gain_over(without)
-        return {n: self.with_effect(without, n) for n in others if self.predicted_gain(without, n) >= least}
+        least, max_loss = self.criteria.likely_share * current.fit_gain_over(without), self.max_loss_of_likely(current)
+        likely = (name for name in others if self.predicted_gain(without, name) >= least)
+        return {name: self.with_effect(without, name, max_loss=max_loss) for name in likely}
+
+    def max_loss_of_likely(self, current: ScoredModel) -> float:
+        """Return the loss that an effect in the place of what `current` has must be expected to reach: any.
+
+        In further steps random effects may absorb much of it.
+        """
+        return math.inf
 
 
 AnySelector = TypeVar("AnySelector", bound=Selector)
