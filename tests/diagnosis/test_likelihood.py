@@ -9,6 +9,7 @@ import pytest
 
 from agvbench.diagnosis.estimation.likelihood import objective, residual_of
 from agvbench.diagnosis.estimation.variance import initial_variance_components
+from agvbench.diagnosis.model.predictor import RANDOM_EFFECTS
 
 RUNS, SAMPLES = 3, 5
 
@@ -27,7 +28,7 @@ class Readings(SimpleNamespace):
 
 def squares(poses):
     batch = SimpleNamespace(autocorrelation_time=1.0, has_heavy_tails=False)
-    context = SimpleNamespace(readings=Readings(), batch=batch)
+    context = SimpleNamespace(readings=Readings(), batch=batch, random_effects=RANDOM_EFFECTS)
     return objective(context, residual_of(context, poses), np.zeros((RUNS, 6)), initial_variance_components())
 
 

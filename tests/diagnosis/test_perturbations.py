@@ -60,7 +60,7 @@ def test_slopes_by_levels_are_those_of_whole_maps_and_of_each_runs_offsets(predi
 
 @pytest.mark.parametrize("moved", ["map", "effect", "start"])
 def test_what_was_predicted_last_is_kept_for_the_same_question_only(predictor, values, moved):
-    none = np.zeros((len(predictor.readings), 6))
+    none = predictor.no_random_effects()
     first = predictor.predict(values, none).copy()
     assert predictor.predict(values, none) is predictor.predict(values.copy(), none.copy())
     others, random_effects = values.copy(), none.copy()

@@ -200,7 +200,7 @@ def test_slopes_by_nodes_are_those_of_whole_maps(readings):
     assert batch.perturbations.by_node
     predictor = Predictor(batch, ("steering_lag", "cornering_speed_loss"))
     values = np.r_[start_values_of_windows(maps, some, GEOMETRY), 0.1, 0.05]
-    none = np.zeros((len(some), 6))
+    none = predictor.no_random_effects()
     slopes = predictor.linearise(values, none)
     rng = np.random.default_rng(3)
     way = rng.normal(size=len(values)) * 1e-4
@@ -212,11 +212,26 @@ def test_slopes_by_nodes_are_those_of_whole_maps(readings):
     np.testing.assert_allclose((there - back) / 2.0, expected, atol=2e-6)
 
 
+@pytest.mark.parametrize("effects", [(), ("actuation_delay",), ("steering_lag", "speed_lag"), ("marker_offset",)])
+def test_slopes_by_commands_that_no_longer_act_are_zero_and_not_simulated(readings, effects):
+    some = readings.select(np.arange(0, len(readings), 5))
+    maps = smooth_maps(some.runs, NEUTRAL_COMMAND, 40, 30)
+    predictor, other = (Predictor(Batch(some, maps, GEOMETRY, 0.1), effects) for _ in range(2))
+    perturbations = other.batch.perturbations
+    assert perturbations.past.any()
+    assert not perturbations.past.all()
+    other.batch.perturbations = dataclasses.replace(perturbations, past=np.zeros_like(perturbations.past))
+    values = np.r_[start_values_of_windows(maps, some, GEOMETRY), np.full(len(predictor.parameter_names), 0.1)]
+    found, expected = (one.linearise(values, one.no_random_effects()) for one in (predictor, other))
+    np.testing.assert_allclose(found.by_own, expected.by_own, rtol=0.0, atol=2e-4)
+    assert np.count_nonzero(found.by_own) <= np.count_nonzero(expected.by_own)
+
+
 def test_a_command_that_takes_effect_as_a_window_begins_does_not_determine_the_delay():
     read = read_windows(free_runs(QUIET, sessions=1, runs=1, by=_switched), HORIZON, NEUTRAL_COMMAND)
     maps = smooth_maps(read.runs, NEUTRAL_COMMAND, 9, 6)
     predictor = Predictor(Batch(read, maps, GEOMETRY), ("actuation_delay", "cornering_speed_loss", "speed_lag"))
-    start, none = start_values_of_windows(maps, read, GEOMETRY), np.zeros((len(read), 6))
+    start, none = start_values_of_windows(maps, read, GEOMETRY), predictor.no_random_effects()
     simulated = zip(read.simulated(), read.begins_s, strict=True)
     delays_s = [np.min(begins_s - run.commands.t_s[run.commands.t_s < begins_s]) for run, begins_s in simulated]
     slopes = [

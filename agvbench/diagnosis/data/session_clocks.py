@@ -25,8 +25,9 @@ from agvbench.types import Commands, Floats, Run
 
 _OFFSETS_S = np.arange(-0.4, 1.0, 0.02)
 _LAGS_S = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)
-# Least time from the start of one interval to that of the next, and at most so many in a session.
-_STEP_S, _MOST_ROWS = 0.04, 10_000
+# Least time from the start of one interval to that of the next, and at most so many in a session: for the offsets, and
+# for the lag that all sessions have in common.
+_STEP_S, _MOST_ROWS, _ROWS_FOR_LAG = 0.04, 10_000, 500
 _NODES = 13
 _BLOCK_S = 2.0
 # Of a slope of the loss, in offsets to either side.
@@ -90,8 +91,11 @@ def clock_offsets(
     tracks = {name: own for name, own in tracks.items() if sum(len(one.begin_s) for one in own) >= _MIN_ROWS}
     if len(tracks) < 2:
         return {}
-    fits = [_block_losses([_rows(own, steered, lag_s) for own in tracks.values()]) for lag_s in _LAGS_S]
-    losses, _ = min(fits, key=lambda one: one[1])
+
+    def fitted(lag_s: float, most: int) -> tuple[list[Floats], float]:
+        return _block_losses([_rows(own, steered, lag_s, most) for own in tracks.values()])
+
+    losses, _ = fitted(min(_LAGS_S, key=lambda lag_s: fitted(lag_s, _ROWS_FOR_LAG)[1]), _MOST_ROWS)
     estimates = {name: _estimate(loss) for name, loss in zip(tracks, losses, strict=True)}
     known = {name: one for name, one in estimates.items() if one.stderr_s <= SESSION_CLOCK.max_stderr_s}
     return _differences(known)
@@ -155,8 +159,8 @@ def _intervals(t_s: Floats, from_s: float) -> tuple[NDArray[np.int64], NDArray[n
     return first[near], last[near]
 
 
-def _rows(tracks: Sequence[_Track], steered: Sequence[str], lag_s: float) -> _Rows:
-    every = 1 + sum(len(one.begin_s) for one in tracks) // _MOST_ROWS
+def _rows(tracks: Sequence[_Track], steered: Sequence[str], lag_s: float, most: int) -> _Rows:
+    every = 1 + sum(len(one.begin_s) for one in tracks) // most
     tracks = [one.select(np.arange(len(one.begin_s)) % every == 0) for one in tracks]
     commanded = []
     for one in tracks:

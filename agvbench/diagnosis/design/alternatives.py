@@ -85,6 +85,7 @@ def _with_equation(chosen: Fit, name: str, equation: Candidate) -> Fit | None:
             random_effects=near.random_effects,
             variance_components=near.variance_components,
             iterations=iterations,
+            near=near.linear,
         )
 
     found = []

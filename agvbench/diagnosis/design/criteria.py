@@ -13,7 +13,7 @@ from agvbench.diagnosis.design.designs import Design
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.estimation.variance import EVIDENCE_POSES
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.predictor import RANDOM_EFFECTS, Predictor
+from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.planning.workspace import Workspace
 from agvbench.types import NO_TARGET, Floats, Frames, Pose, Run
 from agvbench.vehicle.geometry import Geometry
@@ -109,7 +109,7 @@ def information(
     ``difference`` (R, K, 3), if given, is the difference to the prediction of another model.
     """
     readings = predictor.readings
-    linear = predictor.linearise(parameters, np.zeros((len(readings), len(RANDOM_EFFECTS))))
+    linear = predictor.linearise(parameters, predictor.no_random_effects())
     seen = np.ones(readings.t_s.shape, dtype=np.bool_)
     weighted = Weighted(readings, seen, linear.by_random_effects, fitted)
     e = weighted.column(np.zeros_like(linear.poses) if difference is None else difference)
@@ -134,13 +134,14 @@ class Weighted:
         temper = np.sqrt(np.minimum(1.0, EVIDENCE_POSES / count))
         sd = np.array([variance_components.position_m, variance_components.position_m, variance_components.heading_rad])
         self._weight = temper[:, None, None] * seen[..., None] / sd
-        prior = np.empty((len(readings), len(RANDOM_EFFECTS)))
+        count = by_random_effects.shape[-1]
+        prior = np.empty((len(readings), count))
         prior[:, :2] = np.hypot(readings.start_stderr[:, :2], _START_M)
         prior[:, 2] = np.hypot(readings.start_stderr[:, 2], np.hypot(variance_components.random_effects[0], _START_RAD))
-        prior[:, 3:] = variance_components.random_effects[1:]
+        prior[:, 3:] = variance_components.random_effects[1 : count - 2]
         self._a = self.columns(by_random_effects)
         inner = self._a.transpose(0, 2, 1) @ self._a
-        inner[:, range(len(RANDOM_EFFECTS)), range(len(RANDOM_EFFECTS))] += prior**-2.0
+        inner[:, range(count), range(count)] += prior**-2.0
         self._inverse = np.linalg.inv(inner)
 
     def column(self, values: Floats) -> Floats:

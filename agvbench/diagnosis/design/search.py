@@ -22,7 +22,7 @@ from agvbench.diagnosis.design.designs import Design, Levels, designs, levels_of
 from agvbench.diagnosis.design.identifiability import Unidentified, stderr_ratios
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.batch import Batch
-from agvbench.diagnosis.model.predictor import RANDOM_EFFECTS, Predictor
+from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.proposal import Discrimination
 from agvbench.planning import Workspace
 from agvbench.types import Floats, Pose
@@ -98,11 +98,11 @@ class Search:
         every = self.readings(tried)
         batch = self._batch(every)
         out = np.full((len(flat), len(tried)), np.inf)
-        no_random_effects = np.zeros((len(every), len(RANDOM_EFFECTS)))
         for k, item in enumerate(flat):
             names = (*chosen.predictor.effects, item.effect)
-            _, slopes = Predictor(batch, names).by_last(
-                np.r_[chosen.parameters, item.start], no_random_effects, len(item.start)
+            predictor = Predictor(batch, names)
+            _, slopes = predictor.by_last(
+                np.r_[chosen.parameters, item.start], predictor.no_random_effects(), len(item.start)
             )
             approximate = self._approximate_evidence(slopes[..., item.at], len(tried))
             # Designs with a large effect are aggressive ones: evaluate some with a smaller effect, too.

@@ -32,7 +32,7 @@ _ITERATIONS = 8
 class Fit:
     """A fitted model.
 
-    ``parameters`` (P,), the nodal values first; ``random_effects`` (R, 6) of each run; ``variance_components``;
+    ``parameters`` (P,), the nodal values first; ``random_effects`` (R, q) of each run; ``variance_components``;
     ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): the quadratic
     approximation of the loss at the parameters; ``prior``: that of maps and effects; ``residual`` (R, K, 3): measured
     minus predicted poses, with the random effects; ``linear``: the derivatives at the parameters; ``bounds`` (effects'
@@ -156,7 +156,7 @@ def fit(
         little: the first steps use those of `near`, the last step and the result have their own.
     """
     readings = predictor.readings
-    random_effects = np.zeros((len(readings), 6)) if random_effects is None else random_effects.copy()
+    random_effects = predictor.no_random_effects() if random_effects is None else random_effects.copy()
     variance_components = variance_components or (
         initial_variance_components()
         if predictor.readings.initial_states is None

@@ -23,7 +23,7 @@ _UPDATES, _MIN_CHANGE = 40, 1e-3
 
 @dataclass(frozen=True)
 class Point:
-    """An iterate: ``parameters`` (P,), each run's ``random_effects`` (R, 6) and ``residual`` (R, K, 3)."""
+    """An iterate: ``parameters`` (P,), each run's ``random_effects`` (R, q) and ``residual`` (R, K, 3)."""
 
     parameters: Floats
     random_effects: Floats
@@ -98,7 +98,7 @@ class StepSolver:
 
 @dataclass(frozen=True)
 class FitState:
-    """The estimates of a fit: ``parameters`` (P,), each run's ``random_effects`` (R, 6), ``variance_components``."""
+    """The estimates of a fit: ``parameters`` (P,), each run's ``random_effects`` (R, q), ``variance_components``."""
 
     parameters: Floats
     random_effects: Floats

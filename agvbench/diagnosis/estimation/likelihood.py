@@ -68,8 +68,8 @@ class Terms:
     """The likelihood and its derivatives at some parameters.
 
     ``loss`` (R,): minus two log likelihood of each run; ``information`` and ``gradient`` (R, P): its quadratic
-    approximation; ``inner_inverse`` (R, 6, 6): covariance of the random effects; ``mixed`` (R, 6, P): mixed information
-    about random effects and parameters; ``pull`` (R, 6): gradient by the random effects.
+    approximation; ``inner_inverse`` (R, q, q): covariance of the random effects; ``mixed`` (R, q, P): mixed information
+    about random effects and parameters; ``pull`` (R, q): gradient by the random effects.
     """
 
     loss: Floats
@@ -94,14 +94,14 @@ def terms_of(
     e = (residual * weight).reshape(runs, -1)
     own = linear.own
     j = (linear.by_own * weight[..., None]).reshape(runs, e.shape[1], own.shape[1])
-    a = (linear.by_random_effects * weight[..., None]).reshape(runs, e.shape[1], 6)
+    a = (linear.by_random_effects * weight[..., None]).reshape(runs, e.shape[1], -1)
     prior = priors(predictor, variance_components)
     at, jt = a.transpose(0, 2, 1), j.transpose(0, 2, 1)
     inner, inverse = inner_inverse(a, prior)
     pull = (at @ e[..., None])[..., 0] - random_effects / prior**2
     cross = at @ j
     rows = np.arange(runs)[:, None]
-    mixed = np.zeros((runs, 6, linear.count))
+    mixed = np.zeros((runs, a.shape[2], linear.count))
     mixed[rows, :, own] = cross.transpose(0, 2, 1)
     blocks = jt @ j - cross.transpose(0, 2, 1) @ inverse @ cross
     gradient = np.zeros((runs, mixed.shape[2]))
@@ -130,7 +130,7 @@ def random_effects_step(
     random_effects: Floats,
     variance_components: VarianceComponents,
 ) -> tuple[Floats, Floats]:
-    """Return the step of the random effects (R, 6) to their best values, and their covariance (R, 6, 6)."""
+    """Return the step of the random effects (R, q) to their best values, and their covariance (R, q, q)."""
     weight, prior = weights(predictor, variance_components), priors(predictor, variance_components)
     e = (residual * weight).reshape(len(residual), -1)
     a = (linear.by_random_effects * weight[..., None]).reshape(*e.shape, -1)
@@ -140,9 +140,10 @@ def random_effects_step(
 
 
 def inner_inverse(a: Floats, prior: Floats) -> tuple[Floats, Floats]:
-    """Return the information about each run's random effects (R, 6, 6), with its inverse."""
+    """Return the information about each run's random effects (R, q, q), with its inverse."""
     inner = a.transpose(0, 2, 1) @ a
-    inner[:, range(6), range(6)] += prior**-2.0
+    each = range(prior.shape[1])
+    inner[:, each, each] += prior**-2.0
     return inner, np.asarray(np.linalg.inv(inner))
 
 

@@ -20,8 +20,8 @@ from agvbench.types import Floats
 class LinearisationPoint:
     """A fitted model about which larger models are linearised, with the random effects projected out.
 
-    ``weight`` (R, K, 3): weights of the residuals; ``a`` (R, 3K, 6): derivatives by the random effects; ``inverse``
-    (R, 6, 6): the inverse of their information; ``prior_gradient`` (R, 6): gradient of their prior; ``own`` (R, m):
+    ``weight`` (R, K, 3): weights of the residuals; ``a`` (R, 3K, q): derivatives by the random effects; ``inverse``
+    (R, q, q): the inverse of their information; ``prior_gradient`` (R, q): gradient of their prior; ``own`` (R, m):
     indices of each run's active parameters; ``j`` (R, 3K, m): projected derivatives by these; ``covariance`` (P, P) of
     the parameters that are free, zero for those that are held at a bound; ``pull`` (P,): gradient of the prior of the
     random effects by the parameters; ``residual`` (R, 3K), weighted.

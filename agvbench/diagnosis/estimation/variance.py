@@ -1,8 +1,7 @@
 """Variance components of measurements and runs: initial values, updates, and the weights and priors that follow.
 
-Windows of free driving have no random effects except those of their start pose. The errors of adjacent windows are
-correlated, so that random effects of each window would absorb a cause. The errors grow with time and have heavy tails:
-on another day they may be many times as large. The likelihood of a window is therefore Student's t, with the window and
+The errors of windows of free driving grow with time and have heavy tails: on another day they may be many times as
+large. The likelihood of a window is therefore Student's t, with the window and
 not the sample as unit. That of a run is, too, where the model lacks a cause: a few runs then have errors that are many
 times as large, and would otherwise determine the parameters.
 """
@@ -55,7 +54,7 @@ def initial_variance_components() -> VarianceComponents:
 
 
 def window_variance_components(readings: Readings) -> VarianceComponents:
-    """Return initial values for windows: errors that grow with time, and almost no random effects."""
+    """Return initial values for windows: errors that grow with time."""
     elapsed_s = np.nanmean(readings.t_s - readings.begins_s[:, None], axis=0)
     return VarianceComponents(0.1, 0.1, _MIN_DEVIATION.copy(), elapsed_s / elapsed_s[-1])
 
@@ -106,12 +105,13 @@ def weights(predictor: Predictor, variance_components: VarianceComponents) -> Fl
 
 
 def priors(predictor: Predictor, variance_components: VarianceComponents) -> Floats:
-    """Return the prior standard deviations of each run's random effects, (R, 6)."""
+    """Return the prior standard deviations of each run's q random effects, (R, q)."""
     start = np.hypot(predictor.readings.start_stderr, _START_EXTRA_M)
-    out = np.empty((len(predictor.readings), 6))
+    count = len(predictor.random_effects)
+    out = np.empty((len(predictor.readings), count))
     out[:, :2] = start[:, :2]
     out[:, 2] = np.hypot(start[:, 2], variance_components.random_effects[0])
-    out[:, 3:] = variance_components.random_effects[1:]
+    out[:, 3:] = variance_components.random_effects[1 : count - 2]
     return out
 
 
@@ -123,9 +123,9 @@ def update_variance_components(
     by_random_effects: Floats,
     variance_components: VarianceComponents,
 ) -> VarianceComponents:
-    """Return the estimate from residuals (R, K, 3), random effects (R, 6) and their covariances (R, 6, 6).
+    """Return the estimate from residuals (R, K, 3), random effects (R, q) and their covariances (R, q, q).
 
-    The derivatives of the poses `by_random_effects` are (R, K, 3, 6).
+    The derivatives of the poses `by_random_effects` are (R, K, 3, q).
     """
     seen = predictor.readings.seen
     if predictor.readings.initial_states is not None:

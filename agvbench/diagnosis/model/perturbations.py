@@ -77,7 +77,8 @@ class Perturbations:
     (``by_node``). ``run`` (n,): index of the run. ``simulation``: the copies. ``active`` (R, m): indices of the nodal
     values that each of the R runs depends on, padded with others. ``heading`` (n,): whether the heading is perturbed.
     ``by_role``: the perturbations of each command. ``rows`` (r,) and ``row_change`` (r, 3): the row of each row of the
-    copies, and the derivative of its commands.
+    copies, and the derivative of its commands. ``past`` (n,): whether only commands that ended before the window begins
+    are perturbed; ``past_change`` (rows, 3): the derivative of the commands of `base` by all of these at once.
     """
 
     by_node: bool
@@ -88,6 +89,8 @@ class Perturbations:
     by_role: Mapping[str, PerturbationBatch]
     rows: Integers
     row_change: Floats
+    past: NDArray[np.bool_]
+    past_change: Floats
 
     @classmethod
     def of(
@@ -116,6 +119,7 @@ class Perturbations:
                 changed.append(change)
         kinds, index = np.array(kind), np.array(run)
         active = _active(rows_of_run, weights)
+        past, past_change = _past(base, index, [rows_of_run[i] for i in run], changed)
         return cls(
             by_node,
             index,
@@ -125,6 +129,8 @@ class Perturbations:
             _grouped(maps, weights, active, index, kinds, np.array(row), by_node=by_node),
             np.concatenate([rows_of_run[i] for i in run]),
             np.concatenate(changed),
+            past & (kinds != "heading"),
+            past_change,
         )
 
 
@@ -134,6 +140,20 @@ def _active(rows_of_run: Sequence[Integers], weights: Mapping[str, Floats]) -> I
         [np.concatenate([(weights[role][own] != 0.0).any(axis=0) for role in ROLES]) for own in rows_of_run]
     )
     return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
+
+
+def _past(
+    base: Simulation, run: Integers, rows: Sequence[Integers], changed: Sequence[Floats]
+) -> tuple[NDArray[np.bool_], Floats]:
+    """Return which perturbations (n,) change commands before a window only, and the sum of their changes (rows, 3)."""
+    ends_s = np.append(base.command_t_s[1:], np.inf)
+    ends_s[base.row_starts[1:] - 1] = np.inf
+    past, total = np.zeros(len(run), dtype=np.bool_), np.zeros((len(ends_s), len(ROLES)))
+    for i, (own, change) in enumerate(zip(rows, changed, strict=True)):
+        past[i] = bool(np.all(ends_s[own[change.any(axis=1)]] <= base.begins_s[run[i]]))
+        if past[i]:
+            total[own] += change
+    return past, total
 
 
 def _grouped(

@@ -22,8 +22,9 @@ class Linearised:
     """Predicted poses and their derivatives, stored for each run's active parameters only.
 
     ``poses`` (R, K, 3); ``own`` (R, m): indices of each run's active parameters, out of ``count`` (P); ``by_own``
-    (R, K, 3, m): derivatives by these; ``by_random_effects`` (R, K, 3, 6). ``effects``: names of the effects'
-    parameters, which are the last of the active ones in every run.
+    (R, K, 3, m): derivatives by these; ``by_random_effects`` (R, K, 3, q): by the q random effects of
+    `Predictor.random_effects`. ``effects``: names of the effects' parameters, which are the last of the active ones in
+    every run.
     """
 
     poses: Floats
@@ -61,6 +62,10 @@ class Linearised:
 RANDOM_EFFECTS = ("x_m", "y_m", "heading_rad", "front_rad", "rear_rad", "log_speed")
 """The random effects of a run: its start pose, an offset of each axle, and the logarithm of a factor on speed."""
 
+_OF_START = 3
+"""How many of them are those of the start pose. Windows of free driving have no others: those would absorb causes,
+because the errors of adjacent windows are correlated."""
+
 _STEP = 1e-4  # rad, m/s
 _STEP_SHARE = 1e-3
 # A command that takes effect just as a window begins changes its initial state. With a short step, one such window
@@ -73,12 +78,14 @@ MAX_ANGLE_RAD, MAX_YAW_RATE = 1.4, 30.0
 class Predictor:
     """Predicts runs with nodal maps and some effects; the parameters are the nodal values, then those of the effects.
 
-    ``physical`` are the priors of the effects' parameters. Each derivative is a forward difference of two simulations.
+    ``physical`` are the priors of the effects' parameters. ``random_effects`` names the q random effects of each run or
+    window. Each derivative is a forward difference of two simulations.
     """
 
     def __init__(self, batch: Batch, effects: tuple[str, ...] = ()) -> None:
         self.batch, self.effects = batch, effects
         self.readings, self.maps = batch.readings, batch.maps
+        self.random_effects = RANDOM_EFFECTS if self.readings.initial_states is None else RANDOM_EFFECTS[:_OF_START]
         self._own = np.concatenate([np.empty(0, dtype=np.int64), *(batch.base.indices(name) for name in effects)])
         self.parameter_names: list[str] = [batch.base.parameter_names[i] for i in self._own]
         self.nulls: Floats = batch.base.nulls[self._own]
@@ -112,9 +119,13 @@ class Predictor:
         """Return minus two log density of the priors at `parameters` (P,)."""
         return self.batch.smoothness.loss(parameters) + self.physical.loss(parameters[self.maps.size :])
 
+    def no_random_effects(self) -> Floats:
+        """Return random effects (R, q) of zero."""
+        return np.zeros((len(self.readings), len(self.random_effects)))
+
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return steady-state angles and speed of every row (rows, 3), and initial states (R, 7)."""
-        return self._inputs(parameters, np.zeros((len(self.readings), len(RANDOM_EFFECTS))))
+        return self._inputs(parameters, self.no_random_effects())
 
     def all_parameters(self, parameters: Floats) -> Floats:
         """Return the simulation's parameter vector (p,) for the predictor's `parameters` (P,)."""
@@ -129,11 +140,14 @@ class Predictor:
         """Return steady-state values of every row (rows, 3) and initial states (R, 7)."""
         where, run = self.maps.slices(), self.batch.base.row_runs
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
-        front, rear = (np.clip(values[k] + random_effects[run, 3 + k], *self.steering_limits) for k in (0, 1))
+        if random_effects.shape[1] > _OF_START:
+            front_rad, rear_rad, log_speed = random_effects[run, _OF_START:].T
+            values = [values[0] + front_rad, values[1] + rear_rad, values[2] * np.exp(log_speed)]
+        front, rear = (np.clip(value, *self.steering_limits) for value in values[:2])
         front = np.where(self.batch.acting["front"], front, 0.0)
-        speed = np.where(self.batch.acting["drive"], values[2] * np.exp(random_effects[run, 5]), 0.0)
+        speed = np.where(self.batch.acting["drive"], values[2], 0.0)
         initial = np.zeros((len(self.readings), 7))
-        initial[:, :3] = self.readings.start + random_effects[:, :3]
+        initial[:, :3] = self.readings.start + random_effects[:, :_OF_START]
         if self.readings.initial_states is not None:
             initial[:, 3] = self.readings.initial_states.speed_mps
             initial[:, 4] = self.readings.initial_states.recent_speed_mps
@@ -142,13 +156,11 @@ class Predictor:
         return np.column_stack([front, rear, speed]), initial
 
     def predict(self, parameters: Floats, random_effects: Floats | None = None) -> Floats:
-        """Return poses (R, K, 3) for parameters (P,) and random effects (R, 6), by default zero.
+        """Return poses (R, K, 3) for parameters (P,) and random effects (R, q), by default zero.
 
         The last result is cached and read-only: a fit is linearised where its last step was evaluated.
         """
-        random_effects = (
-            np.zeros((len(self.readings), len(RANDOM_EFFECTS))) if random_effects is None else random_effects
-        )
+        random_effects = self.no_random_effects() if random_effects is None else random_effects
         context = (parameters.tobytes(), random_effects.tobytes())
         if context != self._last[0]:
             settled, initial = self._inputs(parameters, random_effects)
@@ -164,7 +176,7 @@ class Predictor:
         return poses.reshape(len(self.readings), -1, 3)
 
     def linearise(self, parameters: Floats, random_effects: Floats, near: Linearised | None = None) -> Linearised:
-        """Return poses and derivatives about parameters (P,) and random effects (R, 6).
+        """Return poses and derivatives about parameters (P,) and random effects (R, q).
 
         If `near` is given, it supplies the derivatives by the nodal values, by the random effects, and by those
         parameters of effects that it has.
@@ -186,15 +198,19 @@ class Predictor:
         changes = self._changes_by_perturbations(base, settled, initial, parameters[self.maps.size :])
         by_own = np.zeros((*base.shape, perturbations.active.shape[1]))
         columns = by_own.transpose(0, 3, 1, 2)
-        by_random_effects = np.zeros((*base.shape, len(RANDOM_EFFECTS)))
+        by_random_effects = np.zeros((*base.shape, len(self.random_effects)))
         by_random_effects[:, :, 0, 0] = by_random_effects[:, :, 1, 1] = 1.0
-        by_random_effects[..., 2] = changes[perturbations.heading]
+        by_random_effects[..., 2] = (
+            _turned_about(base, initial) if self._acts_alike.all() else changes[perturbations.heading]
+        )
         for k, role in enumerate(ROLES):
             perturbed = perturbations.by_role[role]
             change = changes[perturbed.index]
             by_offset, by_level = self._chain_factors(role, parameters, random_effects, settled)
             by_run = perturbed.by_run
-            by_random_effects[by_run.key[:, 0], :, :, 3 + k] = by_run.sums(change * by_offset[:, None, None])
+            if _OF_START + k < len(self.random_effects):
+                offset = by_run.sums(change * by_offset[:, None, None])
+                by_random_effects[by_run.key[:, 0], :, :, _OF_START + k] = offset
             weight = perturbed.weight * by_level[perturbed.term]
             run, column = perturbed.by_value.key.T
             columns[run, column] = perturbed.by_value.sums(change[perturbed.term] * weight[:, None, None])
@@ -210,7 +226,8 @@ class Predictor:
         perturbed = self.batch.perturbations.by_role[role]
         if role != "drive":
             return np.ones(len(perturbed.run)), np.ones(len(perturbed.run))
-        factor = np.exp(random_effects[perturbed.run, 5])
+        log_speed = random_effects[perturbed.run, _OF_START + 2 :]
+        factor = np.exp(log_speed[:, 0]) if log_speed.shape[1] else np.ones(len(perturbed.run))
         if self.batch.perturbations.by_node:
             return factor * parameters[self.maps.slices()[role]][perturbed.row], factor
         return settled[perturbed.row, 2], factor
@@ -274,15 +291,45 @@ class Predictor:
         return repeats.turned(changes, np.arange(len(base)), initial[:, 2])
 
     def _changes_by_perturbations(self, base: Floats, settled: Floats, initial: Floats, own: Floats) -> Floats:
-        """Return the derivatives (n, K, 3) by each perturbed level (or nodal value), and by the initial heading."""
+        """Return the derivatives (n, K, 3) by each perturbed level (or nodal value), and by the initial heading.
+
+        Most commands before a window no longer act in it: their derivatives are zero, and are not simulated. Nor are
+        those by the heading if no effect reads the place: `_turned_about` returns them.
+        """
         batch, perturbations = self.batch, self.batch.perturbations
         perturbed = settled[perturbations.rows] + _STEP * perturbations.row_change
         first = initial[perturbations.run]
         first[:, 2] += _STEP * perturbations.heading
         repeats = batch.alike(base, initial[:, 2])
         representative = batch.perturbations_of(repeats)
-        poses = perturbations.simulation.predict(
-            perturbed, self._all(own), first, runs=np.unique(representative), nodal_deviation=batch.nodal_deviation
-        ).reshape(len(perturbations.run), -1, 3)
+        simulated = np.unique(representative)
+        if self._acts_alike.all():
+            simulated = simulated[~perturbations.heading[simulated]]
+        past, run = perturbations.past[simulated], perturbations.run[simulated]
+        if past.any():
+            simulated = simulated[~past | self._past_acts(base, settled, initial, own)[run]]
+        poses = base[perturbations.run]
+        perturbations.simulation.predict(
+            perturbed,
+            self._all(own),
+            first,
+            runs=simulated,
+            out=poses.reshape(-1, 3),
+            nodal_deviation=batch.nodal_deviation,
+        )
         changes = (poses - base[perturbations.run])[representative] / _STEP
         return repeats.turned(changes, perturbations.run, initial[:, 2])
+
+    def _past_acts(self, base: Floats, settled: Floats, initial: Floats, own: Floats) -> NDArray[np.bool_]:
+        """Return in which windows (R,) a change of all the commands that ended before it moves the poses `base`.
+
+        What moves them less than `_STEP` times as far as the change is within the error of a forward difference.
+        """
+        moved = self._simulate(settled + _STEP * self.batch.perturbations.past_change, own, initial) - base
+        return np.asarray(~np.all((np.abs(moved) <= _STEP * _STEP) | np.isnan(base), axis=(1, 2)))
+
+
+def _turned_about(poses: Floats, initial: Floats) -> Floats:
+    """Return the derivatives of poses (R, K, 3) by the heading of the start poses (R, ≥ 3) about which they turn."""
+    x, y = (poses[..., k] - initial[:, None, k] for k in (0, 1))
+    return np.stack([-y, x, np.ones_like(x)], axis=-1)

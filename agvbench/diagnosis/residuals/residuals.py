@@ -40,7 +40,7 @@ class EndCovariance:
 def end_covariance(every: Predictor, fitted: Fit) -> EndCovariance:
     """Return the covariance of the end poses of the runs of `every`, with the parameters of `fitted`."""
     readings = every.readings
-    linear = every.linearise(fitted.parameters, np.zeros((len(readings), 6)))
+    linear = every.linearise(fitted.parameters, every.no_random_effects())
     rows = np.arange(len(readings))
     last = readings.seen.shape[1] - 1 - np.argmax(readings.seen[:, ::-1], axis=1)
     rotation = np.zeros((len(readings), 3, 3))

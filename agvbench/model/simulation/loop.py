@@ -22,6 +22,7 @@ from agvbench.effects.state import (
     HEADING,
     HOURS,
     KNOWN_FRONT,
+    KNOWN_REAR,
     LOGGED,
     MEASURED_WEIGHT,
     MEASURED_YAW_RATE,
@@ -257,7 +258,7 @@ def simulate(
     """
     s, plan, work = np.zeros(SIZE), np.zeros(PLAN_SIZE), np.zeros(WORK_SIZE)
     servos, start = np.zeros(SERVOS_SIZE), np.zeros(START_SIZE)
-    s[KNOWN_FRONT] = math.nan
+    s[KNOWN_FRONT] = s[KNOWN_REAR] = math.nan
     for run in chosen:
         k, stop = starts[run], starts[run + 1]
         if k == stop:

@@ -107,6 +107,8 @@ class Simulation:
         Index of the run of each row and frame.
     t_s : ndarray, shape (frames,)
         Stamps.
+    begins_s : ndarray, shape (runs,)
+        Time stamp of the initial pose of each window, NaN for runs from rest.
 
     Raises
     ------
@@ -150,7 +152,7 @@ class Simulation:
         self._from_neutral = np.column_stack([self.drive, self.front, self.rear]) - neutral
         self._started_h = np.array([run.started_h for run in runs], dtype=np.float64)
         self._logged = _logged(runs)
-        self._begins_s = np.array([np.nan if run.begins_s is None else run.begins_s for run in runs])
+        self.begins_s = np.array([np.nan if run.begins_s is None else run.begins_s for run in runs])
         self._steps_s = np.array([kind.longest_step_s for kind in self.kinds for _ in kind.parameters()])
         self._all_runs = np.arange(len(runs))
         self._kernel = kernel(self.kinds)
@@ -257,7 +259,7 @@ class Simulation:
         arguments = (
             np.append(parameters, np.logical_or.reduceat(parameters != self.nulls, self._first_parameters)),
             np.ascontiguousarray(initial, dtype=np.float64),
-            self._begins_s,
+            self.begins_s,
             self._started_h,
             self._logged,
             self._from_neutral,

@@ -56,6 +56,7 @@ from agvbench.model.simulation.layout import (
     WEIGHTS,
 )
 from agvbench.model.simulation.stages import drift, drive, move, steer
+from agvbench.model.simulation.trigonometry import cosine_and_sine
 from agvbench.types import Floats
 
 
@@ -77,10 +78,12 @@ def set_motion(s: Floats, p: Floats, vehicle: Floats) -> None:
         s[LEFT] += vehicle[REAR_AXLE] * s[YAW_RATE]
         return
     front, rear = s[FRONT], s[REAR]
-    if front != s[KNOWN_FRONT] or rear != s[KNOWN_REAR]:
-        s[KNOWN_FRONT], s[KNOWN_REAR] = front, rear
-        s[COS_FRONT], s[COS_REAR] = math.cos(front), math.cos(rear)
-        s[TAN_FRONT], s[TAN_REAR] = math.sin(front) / s[COS_FRONT], math.sin(rear) / s[COS_REAR]
+    if front != s[KNOWN_FRONT]:
+        cosine, sine = cosine_and_sine(front)
+        s[KNOWN_FRONT], s[COS_FRONT], s[TAN_FRONT] = front, cosine, sine / cosine
+    if rear != s[KNOWN_REAR]:
+        cosine, sine = cosine_and_sine(rear)
+        s[KNOWN_REAR], s[COS_REAR], s[TAN_REAR] = rear, cosine, sine / cosine
     s[FRONT_SPEED] = s[REAR_SPEED] = s[SPEED]
     s[DRAGGED] = 1.0
     drive(s, p)
@@ -111,13 +114,16 @@ def take_step(
         s[ROLLED] = start[START_ROLLED] + elapsed * s[SPEED]
         set_motion(s, p, vehicle)
         work[LONGITUDINAL + i], work[LATERAL + i], work[TURN + i] = s[FORWARD], s[LEFT], s[YAW_RATE]
+    start_cosine, start_sine = math.cos(start[2]), math.sin(start[2])
     for i in range(COUNT):
         turned = 0.0
         for j in range(COUNT):
-            turned += TO_NODES[i, j] * work[TURN + j]
-        heading = start[2] + length * turned
-        cosine, sine = math.cos(heading), math.sin(heading)
-        s[HEADING] = heading
+            turned += length * TO_NODES[i, j] * work[TURN + j]
+        # The heading by the formulas of a sum of angles: little is turned within a step.
+        cosine_turned, sine_turned = cosine_and_sine(turned)
+        cosine = start_cosine * cosine_turned - start_sine * sine_turned
+        sine = start_sine * cosine_turned + start_cosine * sine_turned
+        s[HEADING] = start[2] + turned
         s[FORWARD], s[LEFT], s[YAW_RATE] = work[LONGITUDINAL + i], work[LATERAL + i], work[TURN + i]
         s[X_RATE] = cosine * s[FORWARD] - sine * s[LEFT]
         s[Y_RATE] = sine * s[FORWARD] + cosine * s[LEFT]
