@@ -80,6 +80,18 @@ CASES: Cases = {
         _mapping('heading = { column = "yaw", unit = "deg" }', _QUATERNION),
     ),
     "mapping-wheelbase": ("a wheelbase of 0 m", _mapping("front_axle_m = 0.1", "front_axle_m = -0.1")),
+    "mapping-logged-name": (
+        "a further column with the name of one of the campaign's own",
+        lambda: _import(MAPPING + '[logged]\nx_m = { column = "X" }\n'),
+    ),
+    "mapping-logged-topic": (
+        "a topic of a further column, for a CSV",
+        lambda: _import(MAPPING + '[logged]\nvolts = { column = "X", topic = "/volts" }\n'),
+    ),
+    "recording-logged-column": (
+        "a further column that the CSV lacks",
+        lambda: _import(MAPPING + '[logged]\nvolts = { column = "volts" }\n'),
+    ),
     "recording-absent": ("a recording that does not exist", lambda: _import(files=("s.csv",))),
     "recording-none": ("no recordings", lambda: _import(files=())),
     "recording-twice": ("two recordings of one name", _one_name_twice),

@@ -118,6 +118,16 @@ def test_numbers_of_own_types_by_their_paths(tmp_path: Path) -> None:
         np.testing.assert_array_equal(run.frames.x_m, np.array(circle())[:, 1])
 
 
+def test_what_else_was_logged_is_that_of_its_topic(tmp_path: Path) -> None:
+    volts = [
+        Sent(circle()[row][0] - 1, "/volts", lambda make, v=v: make("std_msgs/Float64", v))
+        for row, v in ((0, 12.0), (30, 11.5))
+    ]
+    mapping = DIFFERENTIAL + '\n[logged]\nbattery_V = { topic = "/volts", column = "data", time = "received" }\n'
+    run = next(iter(imported(tmp_path, sorted(driven() + volts, key=lambda m: m.ns), mapping)))
+    np.testing.assert_array_equal(run.logged["battery_V"].value, [12.0] * 30 + [11.5] * 30)
+
+
 def test_a_flag_says_when_the_vehicle_drives_by_itself(tmp_path: Path) -> None:
     flags = [
         Sent(circle()[row][0] - 1, "/auto", lambda make, on=on: make("std_msgs/Bool", on))

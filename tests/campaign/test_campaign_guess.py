@@ -187,6 +187,19 @@ def test_a_column_of_true_and_false_says_which_rows_count(tmp_path):
     assert "armed: do only rows with true count as driven?" in questions
 
 
+def test_what_the_supply_was_is_kept_if_it_varies(tmp_path):
+    table, _ = written("plain")
+    table |= {"Battery [V]": [12.0 - 1e-4 * row for row in range(ROWS)], "logic_voltage": [5.0] * ROWS}
+    table |= {"motor_current_A": [0.1 * (row % 7) for row in range(ROWS)]}
+    path = write_csv(tmp_path / "drive.csv", table)
+    text, _ = guess_mapping(path)
+    assert '[logged]\nBattery_V = { column = "Battery [V]" }\n' in text
+    assert "logic" not in text
+    assert "current" not in text
+    (tmp_path / "mapping.toml").write_text(text, encoding="utf-8")
+    assert {*next(iter(import_recordings(tmp_path / "mapping.toml", [path], tmp_path / "c"))).logged} == {"Battery_V"}
+
+
 def test_the_unit_in_the_name_of_a_command_is_its_unit(tmp_path):
     table, _ = written("plain")
     table["steering_deg"] = [20.0 * value for value in table.pop("steering")]

@@ -123,6 +123,17 @@ def test_an_empty_command_cell_repeats_the_one_before(tmp_path: Path) -> None:
     assert campaign.table("import")["not_driven"].tolist() == [2]  # no command was known yet
 
 
+def test_what_else_was_logged_is_kept_with_the_poses_and_held(tmp_path: Path) -> None:
+    table = recording()
+    table["mV"] = ["", 12000, "", 11800] + [""] * 56
+    mapping = MAPPING + '[logged]\nbattery_V = { column = "mV", scale = 0.001 }\n'
+    _imported(tmp_path, mapping, r=table)
+    run = next(iter(Campaign.open(tmp_path / "c")))
+    assert set(run.logged) == {"battery_V"}
+    np.testing.assert_array_equal(run.logged["battery_V"].t_s, run.frames.t_s)
+    np.testing.assert_allclose(run.logged["battery_V"].value, [np.nan, 12.0, 12.0] + [11.8] * 57)
+
+
 def test_flags_may_be_words_and_mark_lost_frames(tmp_path: Path) -> None:
     table = recording() | {"armed": ["Auto"] * 60, "seen": ["True"] * 10 + ["False"] * 10 + ["True"] * 40}
     mapping = MAPPING.replace("equals = 1", 'equals = "auto"')

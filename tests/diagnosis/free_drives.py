@@ -11,7 +11,7 @@ from tiny_vehicle import HEADER, NEUTRAL, Tiny, drive
 from agvbench.types import NO_TARGET, Commands, Frames, Pose, Run
 
 FREE_HEADER = dataclasses.replace(HEADER, name="free", prediction_horizon_s=2.0, prediction_stride_s=1.0)
-_RECORDED_FROM_S, _PERIOD_S = 2.0, 0.1
+RECORDED_FROM_S, _PERIOD_S = 2.0, 0.1
 
 
 def joystick(seconds: float, rng: np.random.Generator, reach: float = 1.0) -> Commands:
@@ -79,9 +79,9 @@ def free_runs(
 
 
 def _later(commands: Commands, frames: Frames) -> tuple[Commands, Frames]:
-    kept = frames.select(frames.t_s >= _RECORDED_FROM_S)
-    kept = dataclasses.replace(kept, t_s=kept.t_s - _RECORDED_FROM_S)
-    first = round(_RECORDED_FROM_S / _PERIOD_S)
+    kept = frames.select(frames.t_s >= RECORDED_FROM_S)
+    kept = dataclasses.replace(kept, t_s=kept.t_s - RECORDED_FROM_S)
+    first = round(RECORDED_FROM_S / _PERIOD_S)
     values = (commands.drive[first:], commands.front[first:], commands.rear[first:])
-    last = kept.t_s <= commands.t_s[-1] - _RECORDED_FROM_S
-    return Commands(commands.t_s[first:] - _RECORDED_FROM_S, *values), kept.select(last)
+    last = kept.t_s <= commands.t_s[-1] - RECORDED_FROM_S
+    return Commands(commands.t_s[first:] - RECORDED_FROM_S, *values), kept.select(last)

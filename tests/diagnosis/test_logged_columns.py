@@ -279,6 +279,21 @@ def test_windows_of_free_driving_have_the_columns_of_their_run():
     np.testing.assert_array_equal(few.logged.columns[0].per_run, readings.logged.columns[0].per_run[::7])
 
 
+def test_a_window_knows_of_a_column_what_was_logged_before_it_begins():
+    runs = [
+        dataclasses.replace(run, logged={"motor_C": TimeSeries(run.frames.t_s, np.floor(run.frames.t_s / 7.0))})
+        for run in free_runs(Tiny(), sessions=2, runs=1)
+    ]
+    readings = read_windows(runs, Horizon(2.0, 1.0), FREE_HEADER.neutral)
+    before = readings.logged.columns[0].per_run
+    from_there = np.floor((readings.begins_s - 2.0).clip(0.0) / 7.0)
+    assert np.all((from_there <= before) & (before <= np.floor(readings.begins_s / 7.0)))
+    assert len(np.unique(before)) > 4
+    matrix = readings.logged.matrix
+    assert matrix is not None
+    np.testing.assert_allclose(matrix[:, 0], (before - before.mean()) / before.std(), atol=1e-12)
+
+
 COMMANDS, REPEATS, STEPS = 30, 4, 12
 GROUP = np.tile(np.arange(COMMANDS), REPEATS)
 STARTED_H = np.linspace(0.0, 1.2, COMMANDS * REPEATS)

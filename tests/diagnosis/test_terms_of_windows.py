@@ -6,8 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from free_drives import FREE_HEADER, circling, free_runs
-from tiny_vehicle import HEADER, NEUTRAL_COMMAND, InMemory, Tiny
+from free_drives import FREE_HEADER, RECORDED_FROM_S, circling, free_runs
+from tiny_vehicle import HEADER, NEUTRAL_COMMAND, InMemory, Tiny, supply_v
 
 from agvbench.diagnosis import Verdict, diagnose
 from agvbench.diagnosis.data.readings import read_windows
@@ -17,7 +17,7 @@ from agvbench.diagnosis.free_driving.method import static_maps
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.residuals.body_rates import residual_rates
 from agvbench.diagnosis.terms import TERMS
-from agvbench.types import Commands, Run
+from agvbench.types import Commands, Run, TimeSeries
 from agvbench.vehicle.geometry import Geometry
 from agvbench.workflows.diagnosis_files import term_in_words
 
@@ -99,8 +99,50 @@ def test_an_effect_of_the_library_leaves_nothing_to_a_term():
 
 @pytest.mark.parametrize("term", TERMS, ids=lambda term: term.name)
 def test_windows_have_no_terms_of_a_beginning_or_an_end(term):
-    is_of_campaign = term.covariates[0] in {"campaign_time_h", "logged_column"}
+    is_of_campaign = term.covariates[0] == "campaign_time_h"
     assert term.for_windows is not (is_of_campaign or term.name in NOT_FOR_WINDOWS)
+
+
+def with_supply(truth: Tiny, *, is_noise: bool = False) -> list[Run]:
+    """Return free driving with the voltage of the supply logged, or another one that has nothing to do with it."""
+    rng = np.random.default_rng(3)
+    runs = free_runs(truth, sessions=3, runs=2)
+    volts = [
+        12.0 + 0.4 * rng.normal(size=len(run.frames)) if is_noise
+        else supply_v(run.started_s + RECORDED_FROM_S + run.frames.t_s)
+        for run in runs
+    ]  # fmt: skip
+    return [
+        dataclasses.replace(run, logged={"supply_V": TimeSeries(run.frames.t_s, own)})
+        for run, own in zip(runs, volts, strict=True)
+    ]
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        Tiny(per_volt=0.15),
+        # A lag of the drive mimics the slow change of the speed, and would leave nothing to the voltage.
+        pytest.param(Tiny(per_volt=0.15, delay_s=0.1, steering_lag_s=0.1), marks=pytest.mark.slow),
+    ],
+    ids=["alone", "beside a delay and a lag"],
+)
+def test_a_supply_that_was_logged_explains_what_changes_within_a_recording(truth):
+    found = diagnose(InMemory(with_supply(truth), FREE_HEADER))
+    assert [d.covariate for d in found.depends_on] == ["supply_V"]
+    assert "speed_lag" not in {effect.name for effect in found.effects}
+    term = found.provenance["empirical_term"]
+    assert term["name"] == "speed_by_logged_column"
+    change = term["parameters"]["change"] / term["parameters"]["deviation"]
+    assert change == pytest.approx(0.15, rel=0.1)
+    assert term["held_out_position_mm"]["with"] < 0.4 * term["held_out_position_mm"]["without"]
+
+
+@pytest.mark.parametrize("truth", [Tiny(), Tiny(per_volt=0.15)], ids=["nothing hidden", "another voltage matters"])
+def test_a_supply_that_matters_nothing_describes_nothing(truth):
+    found = diagnose(InMemory(with_supply(truth, is_noise=truth.per_volt > 0.0), FREE_HEADER))
+    assert "empirical_term" not in found.provenance
+    assert not found.depends_on or found.depends_on[0].covariate != "supply_V"
 
 
 def test_a_term_that_does_not_hold_is_said_to_be_worse():

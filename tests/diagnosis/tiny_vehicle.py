@@ -100,6 +100,7 @@ class Tiny:
     axle_play_rad: float = 0.0
     supply_loss_s_per_m: float = 0.0
     supply_s: float = 1.5
+    per_volt: float = 0.0
     reversal_pause_s: float = 0.0
     brake_turn_per_m: float = 0.0
     seam_rad: float = 0.0
@@ -164,6 +165,14 @@ class Electronics:
         return commanded * (1.0 - self.tiny.supply_loss_s_per_m * self.drawn)
 
 
+SUPPLY_V = 12.0
+
+
+def supply_v(t_s):
+    """Return the voltage of the supply, which other loads change slowly."""
+    return SUPPLY_V + 0.5 * np.sin(t_s / 7.0) + 0.2 * np.sin(t_s / 2.9)
+
+
 def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np.random.Generator) -> Frames:
     """Return 60 Hz frames of one run, from rest to rest."""
     f_off, r_off = rng.normal(0.0, tiny.axle_scatter_rad, 2)
@@ -189,7 +198,7 @@ def drive(tiny: Tiny, commands: Commands, start: Pose, started_s: float, rng: np
             poses.append((x, y, heading))
         row = int(np.searchsorted(commands.t_s, t - tiny.delay_s + 1e-12, side="right")) - 1
         c = commands.at(row) if row >= 0 else unmoved
-        commanded = speed_of(c.drive) * gain
+        commanded = speed_of(c.drive) * gain * (1.0 + tiny.per_volt * (supply_v(started_s + t) - SUPPLY_V))
         asked, commanded = electronics.obey(c, commanded)
         load = load * math.exp(-_STEP_S / tiny.sag_s) + sum(map(abs, np.subtract(asked, before_asked)))
         before_asked = asked

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as Named
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from agvbench.campaign.recordings.mapping import ISO_8601, TIME, Flag, Mapping, factor, quantities
+from agvbench.campaign.recordings.mapping import ISO_8601, TIME, Flag, Mapping, Signal, factor, quantities
 from agvbench.campaign.recordings.recording import Mask, Poses, Recording, Series, combine
 from agvbench.campaign.tables.csv_text import read_csv_text
 from agvbench.campaign.tables.schema import UNKNOWN_COUNT, ColumnSpec, Kind, fill_columns, type_columns
@@ -45,7 +46,8 @@ def read_csv_recording(path: Path, mapping: Mapping) -> Recording:
         cells.count(columns.frame),
     )
     flags = {name: cells.flag(flag) for name, flag in mapping.flags.items()}
-    return combine(path, (path,), mapping, poses, cells.commands(t_s), flags, cells.stretches(columns.cut))
+    commands, logged = cells.series(mapping.commands, t_s), cells.series(mapping.logged, t_s)
+    return combine(path, (path,), mapping, poses, commands, flags, cells.stretches(columns.cut), logged=logged)
 
 
 def _seconds_since_1970(text: pa.ChunkedArray, path: Path) -> Floats:
@@ -131,13 +133,13 @@ class Cells:
             )
         return t_s
 
-    def commands(self, t_s: Floats) -> dict[str, Series]:
-        """Return the commands by role, given at `t_s`; an empty cell repeats the one before."""
+    def series(self, signals: Named[str, Signal], t_s: Floats) -> dict[str, Series]:
+        """Return the values of `signals` by name, given at `t_s`; an empty cell repeats the one before."""
         found = {}
-        for role, signal in self.mapping.commands.items():
+        for name, signal in signals.items():
             values = self.number(signal.column, signal.scale, signal.offset)
             given = np.isfinite(values)
-            found[role] = Series(t_s[given], values[given])
+            found[name] = Series(t_s[given], values[given])
         return found
 
     def flag(self, flag: Flag) -> Mask:

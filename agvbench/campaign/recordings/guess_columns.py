@@ -32,6 +32,9 @@ _NAMES = {
     "tracked": r"track|valid|seen|visible|pose new",
 }
 _TURNS = re.compile(r"cmd w|w cmd|omega|angular|yaw")
+# What may change how fast a vehicle drives; a current is a consequence of how it drives.
+_SUPPLY = re.compile(r"batt|volt|supply|temperature")
+_MOST_LOGGED = 8
 
 
 @dataclass
@@ -130,6 +133,7 @@ def mapping_text(
     commands = _commands(columns)
     fastest, turning, rate_hz = _limits(*motion)
     vehicle, channels = _vehicle(columns)
+    logged = _logged(columns)
     lines = [
         f"# A guess from {columns.path.name}: check every line, and answer those with a question mark.",
         *comments,
@@ -143,6 +147,7 @@ def mapping_text(
         "mocap": [f"rate_hz = {rate_hz:.4g}"],
         "prediction": ["horizon_s = 2.0", "stride_s = 1.0"],
         "columns": pose + commands,
+        **({"logged": logged} if logged else {}),
         "gate": [f"max_speed_m_per_s = {fastest:.3g}", f"max_yaw_rate_rad_per_s = {turning:.3g}"],
         "runs": [f"gap_s = {max(0.25, 5.0 / rate_hz):.3g}", "shortest_s = 2.0", "longest_s = 20.0"],
     }.items():
@@ -159,6 +164,14 @@ def _commands(columns: Columns) -> list[str]:
         for role, name in names.items()
         for line in (_flag(columns, role, name) if role in ("driven", "tracked") else [_command(columns, role, name)])
     ]
+
+
+def _logged(columns: Columns) -> list[str]:
+    """Return the lines of the columns that may tell why the vehicle drives faster or slower: those that vary."""
+    free = [name for name in columns.numbers if name not in columns.taken.values() and _SUPPLY.search(plain(name))]
+    varying = [name for name in free if np.nanmin(columns.numbers[name]) < np.nanmax(columns.numbers[name])]
+    named = {word(name).strip("_-"): name for name in varying}
+    return [f"{key} = {{ {columns.key(name)} }}" for key, name in list(named.items())[:_MOST_LOGGED] if key]
 
 
 def _command(columns: Columns, role: str, name: str) -> str:

@@ -24,7 +24,7 @@ from agvbench.campaign.tables.parts import parts_of
 from agvbench.campaign.tables.timed_table import TimedTable
 from agvbench.campaign.writer import CampaignWriter, check_parts, refuse_occupied
 from agvbench.errors import FileError, RecordingError
-from agvbench.types import NO_TARGET, RUN_OK, Commands, Floats, Frames, Run
+from agvbench.types import NO_TARGET, RUN_OK, Commands, Floats, Frames, Run, TimeSeries
 
 IMPORT_TABLE = "import"
 _UNFINISHED = ".tmp-import"
@@ -158,6 +158,7 @@ def _run(recording: Recording, rows: slice, number: int, begin_s: float, mapping
         frames=_frames(recording, rows, start_s),
         session=rule.session or _session(recording, start_s, mapping),
         extra=extra,
+        logged=_logged(recording, rows, start_s),
     )
 
 
@@ -180,6 +181,12 @@ def _commands(recording: Recording, rows: slice, start_s: float) -> Commands:
     values = np.column_stack([commands.drive, commands.front, commands.rear])[first:last]
     changed = np.flatnonzero(np.r_[True, np.any(np.diff(values, axis=0) != 0.0, axis=1)])
     return Commands(np.maximum(commands.t_s[first:last][changed] - start_s, 0.0), *values[changed].T)
+
+
+def _logged(recording: Recording, rows: slice, start_s: float) -> dict[str, TimeSeries]:
+    """Return the further quantities at the times of these rows, each held from when it was logged."""
+    t_s = recording.t_s[rows]
+    return {name: TimeSeries(t_s - start_s, series.held_at(t_s)) for name, series in recording.logged.items()}
 
 
 def _frames(recording: Recording, rows: slice, start_s: float) -> Frames:

@@ -13,6 +13,7 @@ import msgspec
 
 from agvbench.campaign import header
 from agvbench.campaign.header import SCHEMA, CampaignHeader
+from agvbench.campaign.tables.schema import POSES
 from agvbench.errors import FileError, InputError, OneOf
 from agvbench.text_files import read_toml
 from agvbench.types import Command
@@ -20,6 +21,7 @@ from agvbench.validation import convert
 from agvbench.vehicle.quaternion import Axis
 from agvbench.vehicle.wheels import WheelCommand
 
+_NAMES_OF_POSES = frozenset(column.name for column in POSES)
 ISO_8601 = "iso8601"
 _DELIMITERS = ",;\t|: /#&!~^*%$"
 _SHIPPED = Path(__file__).parent / "mappings"
@@ -89,7 +91,7 @@ class Source(_Strict, frozen=True):
 
 
 class Signal(Source, frozen=True, kw_only=True):
-    """A command column: command = cell · scale + offset, in the unit of its channel."""
+    """A column of commands, or of what else was logged: value = cell · scale + offset, commands in their unit."""
 
     scale: _Number = 1.0
     offset: _Number = 0.0
@@ -185,13 +187,14 @@ class FileRule(_Strict, frozen=True):
 
 
 class Mapping(_Strict, frozen=True):
-    """A whole mapping file."""
+    """A whole mapping file; ``logged`` are further columns by the name that they get in the campaign."""
 
     schema: int
     name: str
     vehicle: Vehicle
     mocap: Mocap
     columns: Columns
+    logged: dict[str, Signal] = {}
     pose: PoseSource | None = None
     prediction: PredictionSettings | None = None
     channels: header.ChannelTables | None = None
@@ -276,6 +279,7 @@ def _check(mapping: Mapping, path: Path) -> None:
         remedy = "install a newer agvbench" if mapping.schema > SCHEMA else f"set schema = {SCHEMA}"
         raise FileError("schema is unknown", where=path, value=mapping.schema, limit=str(SCHEMA), remedy=remedy)
     _check_sources(mapping, path)
+    _check_logged(mapping, path)
     for name, quantity, known in quantities(mapping):
         factor(quantity.unit, known, f"{path}: columns.{name}.unit")
     columns = mapping.columns
@@ -327,12 +331,21 @@ def _check_sources(mapping: Mapping, path: Path) -> None:
         if getattr(columns, name) is not None:
             remedy = "delete it, or [pose]"
             raise FileError(f"columns.{name} has no meaning beside [pose]", where=path, remedy=remedy)
-    for name, source in {**mapping.commands, **mapping.flags}.items():
+    named = {f"columns.{name}": source for name, source in {**mapping.commands, **mapping.flags}.items()}
+    for key, source in {**named, **{f"logged.{name}": source for name, source in mapping.logged.items()}}.items():
         if is_bag and source.topic is None:
-            raise FileError("key 'topic' is missing", where=f"{path}: columns.{name}", remedy=_SEE_ROS)
+            raise FileError("key 'topic' is missing", where=f"{path}: {key}", remedy=_SEE_ROS)
         if source.topic is not None and not is_bag:
             remedy = "give pose.topic, too, or delete it"
-            raise FileError("names a topic where no pose does", where=f"{path}: columns.{name}", remedy=remedy)
+            raise FileError("names a topic where no pose does", where=f"{path}: {key}", remedy=remedy)
+
+
+def _check_logged(mapping: Mapping, path: Path) -> None:
+    """Raise `FileError` if a further column has a name that the campaign uses itself."""
+    for name in mapping.logged:
+        if name in _NAMES_OF_POSES:
+            remedy = "give it another name"
+            raise FileError("the poses have a column of this name", where=path, value=f"logged.{name}", remedy=remedy)
 
 
 _SEE, _SEE_ROS = (f"see docs/how-to/{page}.md" for page in ("import-your-csv", "exchange-with-ros"))

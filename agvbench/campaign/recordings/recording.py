@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Named
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +70,7 @@ class Recording:
     through all recordings [s]; ``commands`` are in command units and in the clock of the poses.
     ``seen`` marks rows with a pose, ``jumped`` those of them that the gate refuses, ``driven`` rows that the vehicle
     drove by itself with a known command, ``cut`` numbers the stretches in which the cut column keeps its value.
+    ``logged`` are further quantities by name, in the clock of the poses.
     """
 
     path: Path
@@ -81,6 +82,7 @@ class Recording:
     driven: Mask
     cut: NDArray[np.int64]
     origin_s: float = 0.0
+    logged: Named[str, Series] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.poses.t_s)
@@ -119,11 +121,12 @@ def combine(
     flags: Named[str, Mask],
     cut: NDArray[np.int64] | None = None,
     *,
+    logged: Named[str, Series] | None = None,
     origin_s: float = 0.0,
 ) -> Recording:
     """Return the recording of these poses and commands (by role); a role without commands stays at neutral.
 
-    `flags` may say by ``"tracked"`` and ``"driven"`` which rows count.
+    `flags` may say by ``"tracked"`` and ``"driven"`` which rows count. `logged` are further quantities.
 
     Raises
     ------
@@ -143,7 +146,7 @@ def combine(
     known_s = together.t_s[0] if len(together) else np.inf
     driven = flags.get("driven", every) & (poses.t_s >= known_s)
     stretches = np.zeros(rows, np.int64) if cut is None else cut
-    return Recording(path, files, poses, together, seen, wild, driven, stretches, origin_s)
+    return Recording(path, files, poses, together, seen, wild, driven, stretches, origin_s, logged or {})
 
 
 def _together(commands: Named[str, Series], header: CampaignHeader) -> Commands:

@@ -38,7 +38,8 @@ def read_tum_recording(path: Path, mapping: Mapping) -> Recording:
         name: Series(t_s, cells.flag(flag).astype(np.float64)).held_at(poses.t_s) == 1.0
         for name, flag in mapping.flags.items()
     }
-    return combine(path, (path, beside), mapping, poses, cells.commands(t_s), flags)
+    commands, logged = cells.series(mapping.commands, t_s), cells.series(mapping.logged, t_s)
+    return combine(path, (path, beside), mapping, poses, commands, flags, logged=logged)
 
 
 def commands_beside(path: Path) -> Path:

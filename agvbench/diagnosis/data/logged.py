@@ -38,19 +38,26 @@ _CONSTANT, _SAME = 1e-9, 0.9999
 class LoggedColumn:
     """One column: ``values`` (R, K + 1) at the start and at the samples of each run, NaN where missing.
 
-    A text has ``levels``, and its values are their numbers.
+    A text has ``levels``, and its values are their numbers. ``before`` (R, J) are values before a window begins.
     """
 
     name: str
     values: Floats
     levels: tuple[str, ...] = ()
+    before: Floats | None = None
 
     @property
     def per_run(self) -> Floats:
-        """The mean of each run (R,), NaN where there is no value."""
-        known = np.isfinite(self.values)
-        total = np.where(known, self.values, 0.0).sum(axis=1)
+        """The mean of each run, or before each window, (R,), NaN where there is no value."""
+        values = self.values if self.before is None else self.before
+        known = np.isfinite(values)
+        total = np.where(known, values, 0.0).sum(axis=1)
         return np.asarray(np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan))
+
+    def select(self, chosen: NDArray[np.int64]) -> LoggedColumn:
+        """Return the column of the `chosen` runs (indices)."""
+        before = None if self.before is None else self.before[chosen]
+        return replace(self, values=self.values[chosen], before=before)
 
 
 @dataclass(frozen=True)
@@ -79,7 +86,7 @@ class LoggedColumns:
         """Return the columns of the `chosen` runs (indices), standardised as those of all runs."""
         if self.matrix is None:
             return self
-        columns = tuple(replace(column, values=column.values[chosen]) for column in self.columns)
+        columns = tuple(column.select(chosen) for column in self.columns)
         return replace(self, columns=columns, matrix=self.matrix[chosen])
 
     def standardised(self, runs: int) -> Floats:
@@ -109,17 +116,20 @@ class _LeftOutError(Exception):
     """A column is no covariate, for the reason in its text."""
 
 
-def logged_columns(runs: Sequence[Run], t_s: Floats, started_h: Floats) -> LoggedColumns:
+def logged_columns(
+    runs: Sequence[Run], t_s: Floats, started_h: Floats, before_s: Floats | None = None
+) -> LoggedColumns:
     """Return the logged columns of `runs` at times `t_s` (R, K + 1) on their clocks.
 
     `started_h` (R,) [h] are the starts since the session began. Columns of runs come before those of poses, in the
-    order of their tables.
+    order of their tables. `before_s` (R, J), for windows, are times before they begin: a prediction knows no later
+    value.
     """
     used: list[LoggedColumn] = []
     left_out: dict[str, str] = {}
     order = np.unique([run.started_s for run in runs], return_inverse=True)[1].astype(np.float64)
     room = LOGGED.max_regressors
-    for name, column in _columns(runs, t_s):
+    for name, column in _columns(runs, t_s, before_s):
         shown = name if name.isprintable() else ascii(name)
         label = shown if len(shown) <= _LONGEST_NAME else f"{shown[:_LONGEST_NAME]}…"
         try:
@@ -142,7 +152,7 @@ def _size(column: LoggedColumn) -> int:
     return len(column.levels) if len(column.levels) > 2 else 1
 
 
-def _columns(runs: Sequence[Run], t_s: Floats) -> Iterator[tuple[str, LoggedColumn | str]]:
+def _columns(runs: Sequence[Run], t_s: Floats, before_s: Floats | None) -> Iterator[tuple[str, LoggedColumn | str]]:
     """Yield each column by name, or why it cannot be read."""
     names = dict.fromkeys(name for run in runs for name in run.extra)
     cells = {name: [run.extra.get(name) for run in runs] for name in names if not _is_written(name)}
@@ -157,8 +167,8 @@ def _columns(runs: Sequence[Run], t_s: Floats) -> Iterator[tuple[str, LoggedColu
         if name in cells:
             yield f"{name} (poses)", "runs have a column of this name"
         else:
-            series = [_at(run.logged.get(name), t) for run, t in zip(runs, t_s, strict=True)]
-            yield name, LoggedColumn(name, np.array(series))
+            before = None if before_s is None else _series(runs, name, before_s)
+            yield name, LoggedColumn(name, _series(runs, name, t_s), before=before)
 
 
 def _is_written(name: str) -> bool:
@@ -211,8 +221,13 @@ def _of_texts(name: str, cells: list[str | None], samples: int) -> LoggedColumn:
     return LoggedColumn(name, np.repeat(values[:, None], samples, axis=1), tuple(levels) or ("",))
 
 
+def _series(runs: Sequence[Run], name: str, t_s: Floats) -> Floats:
+    """Return a series of each run at its times `t_s` (R, n)."""
+    return np.array([_at(run.logged.get(name), own) for run, own in zip(runs, t_s, strict=True)])
+
+
 def _at(series: TimeSeries | None, t_s: Floats) -> Floats:
-    """Return a series, interpolated at `t_s` (K + 1,) between its finite values; NaN if it has none."""
+    """Return a series, interpolated at `t_s` (n,) between its finite values; NaN if it has none."""
     if series is None:
         return np.full(len(t_s), np.nan)
     known = np.isfinite(series.t_s) & np.isfinite(_finite(series.value))

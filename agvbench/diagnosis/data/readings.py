@@ -192,8 +192,16 @@ def read_windows(
     )
     group = blocks(windows, horizon)
     cut = tuple(w.run for w in windows)
-    logged = logged_columns(cut, np.column_stack([initial_states.t_s, t_s]), started_h) if cut else NO_LOGGED_COLUMNS
+    logged = _logged_of_windows(cut, initial_states.t_s, t_s, started_h, horizon) if cut else NO_LOGGED_COLUMNS
     return Readings(cut, t_s, poses, start, stderr, started_h, group, refused, initial_states, logged=logged)
+
+
+def _logged_of_windows(
+    runs: tuple[Run, ...], begins_s: Floats, t_s: Floats, started_h: Floats, horizon: Horizon
+) -> LoggedColumns:
+    """Return the logged columns of windows: what they were for as long before each window as it lasts."""
+    before_s = begins_s[:, None] - np.linspace(0.0, horizon.horizon_s, SAMPLES)
+    return logged_columns(runs, np.column_stack([begins_s, t_s]), started_h, before_s)
 
 
 def _read(run: Run, neutral: Command | None, *, turns_on_the_spot: bool) -> tuple[Floats, Floats, Floats, Floats]:

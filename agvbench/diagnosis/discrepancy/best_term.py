@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from agvbench.diagnosis.criteria import DISCREPANCY
+from agvbench.diagnosis.data.logged import RUN_ORDER
 from agvbench.diagnosis.discrepancy.campaign_time import is_constant
 from agvbench.diagnosis.discrepancy.command_history import command_history
 from agvbench.diagnosis.discrepancy.screening import Start, screen
@@ -20,6 +21,7 @@ from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm
 from agvbench.diagnosis.terms.campaign_time import ByCampaignTime
 
 _MAX_STARTS = 8
+_SMALL = 0.1  # of the typical size of a term
 _COORDINATES = frozenset({"x_m", "y_m"})
 
 
@@ -61,9 +63,26 @@ def linearised_terms(
     starts = []
     for term in terms:
         values = candidate(term).starts
-        if len(values) <= _MAX_STARTS:
+        if issubclass(term, ByLoggedColumn):
+            starts += _by_logged_column(extended, root, term)
+        elif len(values) <= _MAX_STARTS:
             starts.append(Start(term, values, extended.predicted_gain(root, term.name)))
     return sorted((start for start in starts if start.gain > least), key=lambda start: -start.gain)
+
+
+def _by_logged_column(extended: Selector, root: ScoredModel, term: type[ByLoggedColumn]) -> list[Start]:
+    """Return the term of the logged column that is predicted to gain most, if there is one.
+
+    The term is linear: a small change says as much as a large one. The order of runs stands for campaign time.
+    """
+    regressors = extended.batch.readings.logged.regressors
+    kind = candidate(term)
+    starts = []
+    for column in (k for k, regressor in enumerate(regressors) if regressor.column != RUN_ORDER):
+        values = np.where([p.is_discrete for p in term.parameters()], float(column), _SMALL * kind.scale)[None, :]
+        gain = extended.predicted_gain(root, term.name, replace(kind, starts=values))
+        starts.append(Start(term, values, gain))
+    return sorted(starts, key=lambda start: -start.gain)[:1]
 
 
 def terms_without_regression(extended: Selector) -> list[type[DiscrepancyTerm]]:

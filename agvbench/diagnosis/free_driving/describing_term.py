@@ -6,7 +6,7 @@ holds there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +24,7 @@ from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.variants import EXTENDED_LIBRARY
 from agvbench.diagnosis.selection.with_term import SelectedTerm, TermSelection
-from agvbench.diagnosis.terms import TERMS, DiscrepancyTerm
+from agvbench.diagnosis.terms import TERMS, ByLoggedColumn, DiscrepancyTerm
 
 _RANKED_WINDOWS = 100
 _MOST_MIMICKING = 3
@@ -51,7 +51,8 @@ def with_describing_term(selection: Selection, selector: WindowSelector) -> Sele
     extended = selector.for_batch(selector.batch.repacked(kinds=EXTENDED_LIBRARY))
     extended.adopt(selection.base)
     begun = replace(selection, chosen=extended.adopt(selection.chosen))
-    if (found := _best_term(extended, begun, starts)) is None:
+    adopted = [(extended.adopt(root), own) for root, own in starts]
+    if (found := _best_term(extended, begun, adopted)) is None:
         return None
     model, term = found
     beside, gains = _with_effects(extended, begun, model)
@@ -67,14 +68,13 @@ def with_describing_term(selection: Selection, selector: WindowSelector) -> Sele
 
 
 def _best_term(
-    extended: WindowSelector, selection: Selection, starts: Mapping[tuple[str, ...], list[Start]]
+    extended: WindowSelector, selection: Selection, starts: list[tuple[ScoredModel, list[Start]]]
 ) -> tuple[ScoredModel, type[DiscrepancyTerm]] | None:
     """Return the best model with a term, and the term; None if none gains as much over the selection as an effect must.
 
-    The term is beside the selected effects or beside none, fitted from the `starts` for these names of effects.
+    `starts` are models with the terms to fit beside them.
     """
-    roots = [root for root in (selection.chosen, selection.base) if root.names in starts]
-    tried = [best_term(extended, root, starts[root.names]) for root in roots]
+    tried = [best_term(extended, root, own) for root, own in starts]
     better = [pair for pair in tried if pair is not None and pair[0].gain_over(selection.chosen) > extended.min_gain]
     return min(better, key=lambda pair: pair[0].deviance, default=None)
 
@@ -92,40 +92,58 @@ def _with_effects(
     return extended.backward_elimination(selection.base, model, ACTUATORS)
 
 
-def _starts(selection: Selection, selector: WindowSelector) -> dict[tuple[str, ...], list[Start]]:
-    """Return the terms to fit beside the selected effects, and those to fit beside none, by the names of the effects.
+def _starts(selection: Selection, selector: WindowSelector) -> list[tuple[ScoredModel, list[Start]]]:
+    """Return models without terms, each with the terms to fit beside it.
 
-    Terms are ranked by some of the windows. Up to three effects may mimic an unknown cause and leave nothing to a term:
-    beside no effect, a term must be predicted to gain a share of what the effects gain.
+    Terms are ranked by some of the windows. Beside a model that lacks selected effects, a term must be predicted to
+    gain a share of what these gain.
     """
     batch = selector.batch
     some = batch.readings.select(thinned(np.arange(len(batch.readings)), _RANKED_WINDOWS))
     ranking = replace(selector, test_batch=None).for_batch(batch.repacked(some, kinds=EXTENDED_LIBRARY))
     share = len(some) / len(batch.readings)
-    found = {}
-    may_mimic = 0 < len(selection.gains) <= _MOST_MIMICKING
-    for model in (selection.chosen, selection.base) if may_mimic else (selection.chosen,):
+    found = []
+    for model, kind in _roots(selection, selector):
         least = DISCREPANCY.min_share_of_effects * selection.chosen.fit_gain_over(model)
         root = ranking.refitted(model)
-        starts = [] if root is None else _ranked(ranking, root, share * selector.min_gain)
+        starts = [] if root is None else _ranked(ranking, root, kind, share * selector.min_gain)
         starts = [replace(start, gain=start.gain / share) for start in starts if start.gain > share * least]
         if starts:
-            found[model.names] = starts
+            found.append((model, starts))
     return found
 
 
-def _ranked(ranking: WindowSelector, root: ScoredModel, least: float) -> list[Start]:
-    """Return the terms with the largest predicted gains beside `root`, the best first.
+def _roots(selection: Selection, selector: WindowSelector) -> Iterator[tuple[ScoredModel, type[DiscrepancyTerm]]]:
+    """Yield the models beside which terms are tried, and of which kind: the selection, and what may hide a cause.
+
+    Up to three effects may mimic an unknown cause and leave nothing to a term. A lag of the drive mimics what changes
+    the speed slowly, such as a voltage that was logged.
+    """
+    chosen = selection.chosen
+    yield chosen, DiscrepancyTerm
+    if 0 < len(selection.gains) <= _MOST_MIMICKING:
+        yield selection.base, DiscrepancyTerm
+    if selector.batch.readings.logged.regressors:
+        for name in selection.gains if len(selection.gains) > 1 else ():
+            yield selector.without_effect(selection.base, chosen, name), ByLoggedColumn
+
+
+def _ranked(ranking: WindowSelector, root: ScoredModel, kind: type[DiscrepancyTerm], least: float) -> list[Start]:
+    """Return the terms of a kind with the largest predicted gains beside `root`, the best first.
 
     Noise hides a bias from the motion between two poses, of which a window has few: a linearisation decides, but for
     terms of many parameters. It must predict a gain of at `least` that.
     """
-    terms = [term for term in TERMS if term.for_windows and applies(term, ranking.batch.geometry)]
+    terms = [term for term in TERMS if _is_tried(term, kind) and applies(term, ranking.batch.geometry)]
     linear = linearised_terms(ranking, root, terms, least)[: DISCREPANCY.max_starts]
     known = {start.term for start in linear}
-    regressed = [start for start in regressed_terms(ranking, root) if start.term.for_windows]
+    regressed = [start for start in regressed_terms(ranking, root) if _is_tried(start.term, kind)]
     further = [start for start in likely_terms(regressed) if start.term not in known][: DISCREPANCY.max_starts]
     return sorted([*linear, *further], key=lambda start: -start.gain)
+
+
+def _is_tried(term: type[DiscrepancyTerm], kind: type[DiscrepancyTerm]) -> bool:
+    return term.for_windows and issubclass(term, kind)
 
 
 def is_inadequate(model: ScoredModel) -> bool:

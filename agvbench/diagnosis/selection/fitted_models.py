@@ -198,10 +198,11 @@ class FittedModels:
         """Return `current` with an effect that is not fitted: equal to the model without it, and never selected."""
         return replace(current, names=(*current.names, name))
 
-    def predicted_gain(self, current: ScoredModel, name: str) -> float:
+    def predicted_gain(self, current: ScoredModel, name: str, candidate: Candidate | None = None) -> float:
         """Return the predicted gain of the effect `name` beside `current`, to first order, from its best start."""
         try:
-            return max(self._predicted_gains(current, self._predictor((*current.names, name)), default_candidate(name)))
+            predictor = self._predictor((*current.names, name))
+            return max(self._predicted_gains(current, predictor, candidate or default_candidate(name)))
         except np.linalg.LinAlgError:
             return -math.inf  # what cannot be evaluated gains nothing
 

@@ -16,8 +16,8 @@ class DiscrepancyTerm(Effect):
 
     ``form_of`` are effects of the library of which the term is another form: where one was selected, the term is tried
     in its place, even if no residual is left. ``distinguished_by`` are the runs that tell them apart. ``for_windows``
-    says whether a window of free driving can have the term: not if it depends on the beginning or the end of a run, on
-    the time since the campaign began or on a number of each run.
+    says whether a window of free driving can have the term: not if it depends on the beginning or the end of a run, or
+    on the time since the campaign began.
     """
 
     relaxes: ClassVar[str] = "none: it stands for an unknown cause"

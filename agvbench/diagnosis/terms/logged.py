@@ -1,7 +1,7 @@
 """Discrepancy terms of quantities that depend on a column that the lab logged, such as a voltage or a temperature.
 
-Each is linear in the standardised column, by run: its size is that of one standard deviation. The number of the column
-is a parameter that the regression chooses, and that a fit leaves.
+Each is linear in the standardised column, by run or window: its size is that of one standard deviation. The number of
+the column is a parameter that the regression chooses, and that a fit leaves.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ class ByLoggedColumn(DiscrepancyTerm):
     """A term that depends on a logged column; the diagnosis reports the name of the column as covariate."""
 
     covariates: ClassVar[tuple[str, ...]] = ("logged_column",)
-    for_windows: ClassVar[bool] = False
 
 
 @dataclass(frozen=True)

@@ -46,15 +46,17 @@ def read_bag_recording(path: Path, mapping: Mapping) -> Recording:
         If the bag, a topic or a field is missing or cannot be read, stamps are zero, or time goes backwards.
     """
     with Bag(path) as bag:
-        content = read_content(bag, mapping.pose or PoseSource(), {**mapping.commands, **mapping.flags})
+        logged = {f"logged.{name}": signal for name, signal in mapping.logged.items()}
+        content = read_content(bag, mapping.pose or PoseSource(), {**mapping.commands, **mapping.flags, **logged})
         files = bag.files
     commands = {role: content.series[role] for role in mapping.commands}
     flags = {name: content.series[name].held_at(content.poses.t_s) == 1.0 for name in mapping.flags}
-    return combine(path, files, mapping, content.poses, commands, flags, origin_s=content.origin_s)
+    further = {name: content.series[f"logged.{name}"] for name in mapping.logged}
+    return combine(path, files, mapping, content.poses, commands, flags, logged=further, origin_s=content.origin_s)
 
 
 class BagContent(NamedTuple):
-    """Poses and, by name, commands and flags of a bag; their times count from ``origin_s`` [s since 1970].
+    """Poses and, by name, the signals of a bag; their times count from ``origin_s`` [s since 1970].
 
     In seconds since 1970 a float would resolve 0.2 µs only.
     """
@@ -122,7 +124,7 @@ class _Track(ABC):
 
 
 class _SignalTrack(_Track):
-    """A command or a flag; NaN gives none, and an array that is empty neither."""
+    """A command, a flag or what else was logged; NaN gives none, and an array that is empty neither."""
 
     def __init__(self, bag: Bag, signal: Signal | Flag) -> None:
         super().__init__(bag, signal.topic, signal.time)
