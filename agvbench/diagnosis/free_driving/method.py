@@ -23,6 +23,7 @@ from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
 from agvbench.diagnosis.free_driving.describing_term import SelectionWithTerm, with_describing_term
 from agvbench.diagnosis.free_driving.drive_level import DriveLevel, drive_levels, nodal_deviation
+from agvbench.diagnosis.free_driving.lag_or_variation import without_mimicking_lags
 from agvbench.diagnosis.free_driving.maps import NODES, smooth_maps, start_values_of_windows
 from agvbench.diagnosis.free_driving.predictors import autocorrelation_time
 from agvbench.diagnosis.free_driving.selection import WindowSelector, select_drive
@@ -131,6 +132,7 @@ class FreeDriving(Method[SelectedFromWindows]):
         if separate is not selection:
             selection = selector.select(separate.chosen, ACTUATORS)
         selection, selector = select_drive(selection, selector)
+        selection = without_mimicking_lags(selection, selector)
         return selector.with_alternatives(selection), selector
 
     def conclude(self, readings: Readings, split: Split, selected: SelectedFromWindows) -> Diagnosis:

@@ -46,33 +46,9 @@ class Variation:
 
     @classmethod
     def fitted(cls, model: VaryingModel, residuals: WindowResiduals, training: NDArray[np.bool_]) -> Variation:
-        """Return the variation of maximum posterior density, given the residuals of the `training` windows (W,).
-
-        Few recordings say little about how much recordings differ, and the maps absorb a part of that. The prior is
-        therefore the one of `VaryingCriteria`: log-normal, about what servos, floors and batteries differ by. The
-        components of the maps are left out: what the training windows determine varies little.
-        """
-        m, f = len(model.quantities), sum(quantity.varies_within for quantity in model.quantities)
-        residuals = residuals.by_first(m).of_recordings(training[residuals.order])
-        used = training[residuals.order] & np.isfinite(residuals.residual).all(axis=1)
-        between = np.array([_TYPICAL[quantity.unit] for quantity in model.quantities])
-        usual = np.append(_usual_lack(residuals, used), [VARYING.time_error_s, VARYING.at_beginning])
-        mean = np.log(np.concatenate([between, VARYING.share_within * between[:f], [VARYING.drift_s], usual]))
-        of_lack = [*[_WIDE] * _OWN_SCALES, VARYING.spread_time_error, VARYING.spread_at_beginning]
-        spread = np.repeat([VARYING.spread_between, VARYING.spread_within, VARYING.spread_drift], [m, f, 1])
-
-        def parts(values: Floats) -> tuple[Floats, Floats, float, Floats]:
-            return values[:m], values[m : m + f], values[m + f], values[m + f + 1 :]
-
-        def with_variation(values: Floats) -> Floats:
-            return _filtered(residuals, *parts(values))[1][used]
-
-        def alone(values: Floats) -> Floats:
-            return _filtered(residuals, np.zeros(m), np.zeros(f), VARYING.drift_s, values)[1][used]
-
-        found = _most_likely(with_variation, mean, np.append(spread, of_lack))
-        lack_alone = _most_likely(alone, mean[m + f + 1 :], np.array(of_lack))
-        return cls(*parts(found), lack_alone)
+        """Return the variation of maximum posterior density, given the residuals of the `training` windows (W,)."""
+        evidence = _Evidence.of(model, residuals, training)
+        return cls(*evidence.parts(evidence.most_likely()[0]), evidence.most_likely_lack_alone())
 
     def estimates(self, residuals: WindowResiduals) -> tuple[Floats, Floats]:
         """Return quantities and map components at the beginning of each window, and their standard errors, (W, m + r).
@@ -88,6 +64,64 @@ class Variation:
         found = np.empty((2, *value.shape))
         found[:, residuals.order] = share * value, np.sqrt(share * stderr**2 + share * (1.0 - share) * value**2)
         return found[0], found[1]
+
+
+def log_density_with_variation(model: VaryingModel, residuals: WindowResiduals, training: NDArray[np.bool_]) -> float:
+    """Return the logarithm of the largest posterior density of a model in `training` windows (W,), if it varies."""
+    return _Evidence.of(model, residuals, training).most_likely()[1]
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """What training windows say of the variation of a model: their ``residuals``, those ``used`` (W,), and the prior.
+
+    Few recordings say little about how much recordings differ, and the maps absorb a part of that. The prior is
+    therefore the one of `VaryingCriteria`: log-normal, about what servos, floors and batteries differ by, with ``mean``
+    and ``spread`` (m + f + 6,) of the logarithms. The components of the maps are left out: what the training windows
+    determine varies little.
+    """
+
+    residuals: WindowResiduals
+    used: NDArray[np.bool_]
+    m: int
+    f: int
+    mean: Floats
+    spread: Floats
+
+    @classmethod
+    def of(cls, model: VaryingModel, residuals: WindowResiduals, training: NDArray[np.bool_]) -> _Evidence:
+        """Return the evidence of the `training` windows (W,)."""
+        m, f = len(model.quantities), sum(quantity.varies_within for quantity in model.quantities)
+        own = training[residuals.order]
+        residuals = residuals.by_first(m).of_recordings(own)
+        used = training[residuals.order] & np.isfinite(residuals.residual).all(axis=1)
+        between = np.array([_TYPICAL[quantity.unit] for quantity in model.quantities])
+        usual = np.append(_usual_lack(residuals, used), [VARYING.time_error_s, VARYING.at_beginning])
+        mean = np.log(np.concatenate([between, VARYING.share_within * between[:f], [VARYING.drift_s], usual]))
+        of_lack = [*[_WIDE] * _OWN_SCALES, VARYING.spread_time_error, VARYING.spread_at_beginning]
+        spread = np.repeat([VARYING.spread_between, VARYING.spread_within, VARYING.spread_drift], [m, f, 1])
+        return cls(residuals, used, m, f, mean, np.append(spread, of_lack))
+
+    def parts(self, values: Floats) -> tuple[Floats, Floats, float, Floats]:
+        """Return what varies between and within recordings, the drift, and the lack, from all values."""
+        m, f = self.m, self.f
+        return values[:m], values[m : m + f], values[m + f], values[m + f + 1 :]
+
+    def most_likely(self) -> tuple[Floats, float]:
+        """Return the values of maximum posterior density, and the logarithm of it."""
+        return _most_likely(
+            lambda values: _filtered(self.residuals, *self.parts(values))[1][self.used], self.mean, self.spread
+        )
+
+    def most_likely_lack_alone(self) -> Floats:
+        """Return the lack of maximum posterior density if nothing varies."""
+        nothing, lack = np.zeros(self.m + self.f), slice(self.m + self.f + 1, None)
+        between, within = nothing[: self.m], nothing[self.m :]
+        return _most_likely(
+            lambda values: _filtered(self.residuals, between, within, VARYING.drift_s, values)[1][self.used],
+            self.mean[lack],
+            self.spread[lack],
+        )[0]
 
 
 def at_end_of_recordings(
@@ -108,8 +142,8 @@ def at_end_of_recordings(
     }
 
 
-def _most_likely(density: Callable[[Floats], Floats], mean: Floats, spread: Floats) -> Floats:
-    """Return the positive values (n,) of maximum posterior density.
+def _most_likely(density: Callable[[Floats], Floats], mean: Floats, spread: Floats) -> tuple[Floats, float]:
+    """Return the positive values (n,) of maximum posterior density, and the logarithm of it.
 
     Their logarithms have normal priors; `density` returns logarithms of likelihoods.
     """
@@ -118,7 +152,7 @@ def _most_likely(density: Callable[[Floats], Floats], mean: Floats, spread: Floa
         return float(0.5 * np.sum(z**2) - np.sum(density(np.exp(mean + spread * z))))
 
     found = minimize(loss, np.zeros(len(mean)), method="L-BFGS-B", bounds=[(-4.0, 4.0)] * len(mean))
-    return np.asarray(np.exp(mean + spread * found.x))
+    return np.asarray(np.exp(mean + spread * found.x)), -float(found.fun)
 
 
 def _filtered(
