@@ -15,7 +15,8 @@ from agvbench.errors import CampaignError, FileError, OneOf
 T = TypeVar("T")
 
 _AT = re.compile(r"(?P<what>.*?)(?: - at `\$(?P<path>.*)`)?", re.DOTALL)
-_STEP = re.compile(r"\.(?P<key>[^.\[]+)|\[(?P<index>\d+)\]")
+_STEP = re.compile(r"\.(?P<key>[^.\[]+)|\[(?P<index>\d+)\]|\[(?P<any>\.\.\.)\]")
+_LONGEST_KEY = 40
 _UNKNOWN = re.compile(r"Object contains unknown field `(.*)`")
 _MISSING = re.compile(r"Object missing required field `(.*)`")
 _VALUE = re.compile(r"Invalid (?:enum )?value (.*)")
@@ -60,9 +61,11 @@ def _fields(message: str, table: object, kind: type, where: str) -> dict[str, An
     """Return the fields of the error for a message of msgspec."""
     match = _AT.fullmatch(message)
     what, path = (match["what"], match["path"] or "") if match else (message, "")
-    steps: list[str | int] = [step["key"] or int(step["index"]) for step in _STEP.finditer(path)]
+    steps = [step["key"] or (None if step["any"] else int(step["index"])) for step in _STEP.finditer(path)]
+    value, types, keys = _descend(table, inspect.type_info(kind), steps)
+    for key in keys:
+        path = path.replace("[...]", f".{key}", 1)
     place = ": ".join(part for part in (where, path.removeprefix(".")) if part)
-    value, types = _descend(table, inspect.type_info(kind), steps)
     if found := _UNKNOWN.fullmatch(what):
         return {"what": f"unknown key '{found[1]}'", "where": place, "remedy": suggest(found[1], _keys(types))}
     if found := _MISSING.fullmatch(what):
@@ -75,13 +78,34 @@ def _fields(message: str, table: object, kind: type, where: str) -> dict[str, An
     return {"what": what, "where": place}
 
 
-def _descend(value: object, kind: inspect.Type, steps: Sequence[str | int]) -> tuple[object, list[inspect.Type]]:
-    """Return the value at the end of `steps`, and the types that it may have there."""
-    types = _choices(kind, value)
-    for step in steps:
+def _descend(
+    value: object, kind: inspect.Type, steps: Sequence[str | int | None]
+) -> tuple[object, list[inspect.Type], list[str]]:
+    """Return the value at the end of `steps`, the types that it may have there, and the keys that msgspec left out.
+
+    It leaves out the key of a table in which any key is allowed: that step is None.
+    """
+    types, keys = _choices(kind, value), []
+    for given in steps:
+        step = given
+        if step is None:
+            key = step = _failing(value, types)
+            keys.append((key if key.isprintable() else ascii(key))[:_LONGEST_KEY])
         value = _item(value, step)
         types = [choice for outer in types for inner in _inside(outer, step) for choice in _choices(inner, value)]
-    return value, types
+    return value, types, keys
+
+
+def _failing(value: object, types: Iterable[inspect.Type]) -> str:
+    """Return the first key of a table whose entry cannot be converted; an empty text if there is none."""
+    inner = [kind.value_type for kind in types if isinstance(kind, inspect.DictType)]
+    for kind in (kind for kind in inner if isinstance(kind, inspect.StructType)):
+        for key, item in value.items() if isinstance(value, dict) else ():
+            try:
+                msgspec.convert(item, kind.cls)
+            except msgspec.ValidationError:
+                return str(key)
+    return ""
 
 
 def _item(value: object, step: str | int) -> object:
@@ -105,6 +129,8 @@ def _inside(kind: inspect.Type, step: str | int) -> Iterable[inspect.Type]:
         return [*tag, *(field.type for field in kind.fields if field.encode_name == step)]
     if isinstance(kind, inspect.VarTupleType | inspect.ListType):
         return [kind.item_type]
+    if isinstance(kind, inspect.DictType):
+        return [kind.value_type]
     return []
 
 

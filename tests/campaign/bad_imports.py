@@ -84,6 +84,26 @@ CASES: Cases = {
         "a further column with the name of one of the campaign's own",
         lambda: _import(MAPPING + '[logged]\nx_m = { column = "X" }\n'),
     ),
+    "mapping-logged-empty": (
+        "a further column without a name",
+        lambda: _import(MAPPING + '[logged]\n"" = { column = "X" }\n'),
+    ),
+    "mapping-logged-many": (
+        "65 further columns",
+        lambda: _import(MAPPING + "[logged]\n" + "".join(f'c{k} = {{ column = "X" }}\n' for k in range(65))),
+    ),
+    "mapping-logged-key": (
+        "a misspelt key of a further column",
+        lambda: _import(MAPPING + '[logged]\na = { column = "X" }\nvolts = { colunm = "X" }\n'),
+    ),
+    "mapping-logged-scale": (
+        "text as the scale of a further column",
+        lambda: _import(MAPPING + '[logged]\nvolts = { column = "X", scale = "2" }\n'),
+    ),
+    "recording-logged-overflow": (
+        "a further column whose scale makes a cell infinite",
+        lambda: _import(MAPPING + '[logged]\nvolts = { column = "X", scale = 1e12 }\n', X=["1e300"] * 60),
+    ),
     "mapping-logged-topic": (
         "a topic of a further column, for a CSV",
         lambda: _import(MAPPING + '[logged]\nvolts = { column = "X", topic = "/volts" }\n'),

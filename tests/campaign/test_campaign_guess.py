@@ -191,13 +191,18 @@ def test_what_the_supply_was_is_kept_if_it_varies(tmp_path):
     table, _ = written("plain")
     table |= {"Battery [V]": [12.0 - 1e-4 * row for row in range(ROWS)], "logic_voltage": [5.0] * ROWS}
     table |= {"motor_current_A": [0.1 * (row % 7) for row in range(ROWS)]}
+    table |= {"battery_current_A": table["motor_current_A"], "Battery (V)": [11.0 + 1e-4 * row for row in range(ROWS)]}
+    table |= {"rear_battery_V": table["Battery (V)"], "supply": [math.inf] + [1.0] * (ROWS - 1)}
+    table |= {"low_battery": ["true", "false"] * (ROWS // 2), "volts": [math.nan] * ROWS}
     path = write_csv(tmp_path / "drive.csv", table)
     text, _ = guess_mapping(path)
-    assert '[logged]\nBattery_V = { column = "Battery [V]" }\n' in text
-    assert "logic" not in text
-    assert "current" not in text
+    assert (
+        '[logged]\nBattery_V = { column = "Battery [V]" }\nBattery_V_2 = { column = "Battery (V)" }\n'
+        'rear_battery_V = { column = "rear_battery_V" }\n\n'
+    ) in text
+    assert not any(word in text for word in ("logic", "current", "low_battery", "supply", "volts", "rear = "))
     (tmp_path / "mapping.toml").write_text(text, encoding="utf-8")
-    assert {*next(iter(import_recordings(tmp_path / "mapping.toml", [path], tmp_path / "c"))).logged} == {"Battery_V"}
+    assert len(next(iter(import_recordings(tmp_path / "mapping.toml", [path], tmp_path / "c"))).logged) == 3
 
 
 def test_the_unit_in_the_name_of_a_command_is_its_unit(tmp_path):

@@ -294,6 +294,27 @@ def test_a_window_knows_of_a_column_what_was_logged_before_it_begins():
     np.testing.assert_allclose(matrix[:, 0], (before - before.mean()) / before.std(), atol=1e-12)
 
 
+def test_a_column_that_says_nothing_before_windows_is_no_regressor():
+    """It is constant but for the last second, or begins late, or is a clock."""
+    runs = [
+        dataclasses.replace(
+            run,
+            logged={
+                "switched_off": TimeSeries(run.frames.t_s, 8.4 + 0.1 * (run.frames.t_s > run.frames.t_s[-1] - 1.0)),
+                "late": TimeSeries(run.frames.t_s[-60:], 12.0 + run.frames.t_s[-60:]),
+                "clock": TimeSeries(run.frames.t_s, run.started_s + run.frames.t_s),
+            },
+        )
+        for run in free_runs(Tiny(), sessions=2, runs=1)
+    ]
+    logged = read_windows(runs, Horizon(2.0, 1.0), FREE_HEADER.neutral).logged
+    assert names(logged) == ["switched_off"]
+    assert logged.regressors == ()
+    assert logged.matrix is None
+    assert logged.left_out["late"].startswith("a value in ")
+    assert logged.left_out["clock"].startswith("counts the runs")
+
+
 COMMANDS, REPEATS, STEPS = 30, 4, 12
 GROUP = np.tile(np.arange(COMMANDS), REPEATS)
 STARTED_H = np.linspace(0.0, 1.2, COMMANDS * REPEATS)

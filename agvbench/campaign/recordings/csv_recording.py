@@ -86,7 +86,9 @@ class Cells:
         if column not in self.table.column_names:
             names = ", ".join(name[:40] for name in self.table.column_names[:20])
             raise FileError(
-                f"has no column {column!r} (it has {names})", where=self.path, remedy="correct the mapping's columns"
+                f"has no column {column[:40]!r} (it has {names})",
+                where=self.path,
+                remedy="correct the mapping's columns",
             )
         return self.table[column]
 
@@ -102,10 +104,12 @@ class Cells:
     def number(self, column: str, scale: float = 1.0, offset: float = 0.0) -> Floats:
         """Return a column as numbers, NaN where empty."""
         values = self._typed(column, "number")
-        if np.isinf(values).any():
-            row = int(np.argmax(np.isinf(values)))
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is infinite, and refused
+            scaled = values * scale + offset if (scale, offset) != (1.0, 0.0) else values
+        if np.isinf(scaled).any():
+            row = int(np.argmax(np.isinf(scaled)))
             raise FileError(f"row {row + 1}: {column} is infinite", where=self.path, remedy="leave the cell empty")
-        return values * scale + offset if (scale, offset) != (1.0, 0.0) else values
+        return scaled
 
     def count(self, column: str | None) -> NDArray[np.int64]:
         """Return a column as whole numbers, −1 where empty."""

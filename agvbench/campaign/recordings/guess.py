@@ -106,6 +106,7 @@ def _columns(path: Path, values: Path, csv: Csv) -> Columns:
     """
     table = read_csv_text(values, columns=(), delimiter=csv.delimiter, decimal=csv.decimal)
     logical = frozenset(name for name in table.column_names if pa.types.is_boolean(table[name].type))
+    dates = frozenset(name for name in table.column_names if pa.types.is_temporal(table[name].type))
     found = {}
     for name in table.column_names:
         column = table[name]
@@ -113,11 +114,11 @@ def _columns(path: Path, values: Path, csv: Csv) -> Columns:
             own = np.asarray(column.to_numpy(zero_copy_only=False), dtype=np.float64)
         except (TypeError, ValueError):
             continue
-        if '"' not in name and "\\" not in name and np.isfinite(own).any():
+        if '"' not in name and "\\" not in name and name.isprintable() and np.isfinite(own).any():
             found[name] = own
     if not found or not len(next(iter(found.values()))):
         raise FileError("has no rows of numbers", where=values, remedy="give a CSV recording with a header line")
-    return Columns(path, found, logical=logical)
+    return Columns(path, found, logical=logical, dates=dates)
 
 
 def _time(columns: Columns) -> tuple[str, str, Floats]:

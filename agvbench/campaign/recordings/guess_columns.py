@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +32,13 @@ _NAMES = {
     "driven": r"arm|enable|auto|active|safety|dead ?man",
     "tracked": r"track|valid|seen|visible|pose new",
 }
+_COMMANDS = ("drive", "front", "rear")
 _TURNS = re.compile(r"cmd w|w cmd|omega|angular|yaw")
-# What may change how fast a vehicle drives; a current is a consequence of how it drives.
+# What may change how fast a vehicle drives; a current or a power is a consequence of how it drives.
 _SUPPLY = re.compile(r"batt|volt|supply|temperature")
-_MOST_LOGGED = 8
+_CONSEQUENCE = re.compile(r"current|power|amp|watt|\b[aw]\b")
+_NO_COMMAND = re.compile(r"batt|temperature")
+_MOST_LOGGED, _LONGEST_KEY = 16, 40
 
 
 @dataclass
@@ -42,7 +46,7 @@ class Columns:
     """The numbers of a recording, and what was taken for what; ``taken`` are columns that have a role.
 
     ``keys`` are the keys of the mapping that name a column, where they are not ``column = "NAME"``; ``is_si`` says that
-    commands are in SI units; ``logical`` are the columns of true and false.
+    commands are in SI units; ``logical`` are the columns of true and false, and ``dates`` those of dates.
     """
 
     path: Path
@@ -50,6 +54,7 @@ class Columns:
     keys: Mapping[str, str] = field(default_factory=dict)
     is_si: bool = False
     logical: frozenset[str] = frozenset()
+    dates: frozenset[str] = frozenset()
     taken: dict[str, str] = field(default_factory=dict)
     questions: list[str] = field(default_factory=list)
 
@@ -58,6 +63,8 @@ class Columns:
         pattern = re.compile(_NAMES[role])
         free = [name for name in (self.numbers if among is None else among) if name not in self.taken.values()]
         fitting = [name for name in free if pattern.search(plain(name))]
+        if role in _COMMANDS:
+            fitting = [name for name in fitting if not _NO_COMMAND.search(plain(name))]
         if not fitting:
             return None
         best = min(fitting, key=lambda name: (bool(MEASURED.search(plain(name))), free.index(name)))
@@ -167,11 +174,21 @@ def _commands(columns: Columns) -> list[str]:
 
 
 def _logged(columns: Columns) -> list[str]:
-    """Return the lines of the columns that may tell why the vehicle drives faster or slower: those that vary."""
-    free = [name for name in columns.numbers if name not in columns.taken.values() and _SUPPLY.search(plain(name))]
-    varying = [name for name in free if np.nanmin(columns.numbers[name]) < np.nanmax(columns.numbers[name])]
-    named = {word(name).strip("_-"): name for name in varying}
-    return [f"{key} = {{ {columns.key(name)} }}" for key, name in list(named.items())[:_MOST_LOGGED] if key]
+    """Return the lines of the columns that may tell why the vehicle drives faster or slower: numbers that vary."""
+    named: dict[str, str] = {}
+    for name, values in columns.numbers.items():
+        known = values[~np.isnan(values)]
+        is_number = name not in columns.logical | columns.dates and len(known) > 0 and bool(np.isfinite(known).all())
+        if not is_number or name in columns.taken.values() or not _is_supply(plain(name)) or known.min() == known.max():
+            continue
+        key = word(name).strip("_-")[:_LONGEST_KEY] or "supply"
+        further = (f"{key}_{number}" for number in count(2))
+        named[key if key not in named else next(other for other in further if other not in named)] = name
+    return [f"{key} = {{ {columns.key(name)} }}" for key, name in list(named.items())[:_MOST_LOGGED]]
+
+
+def _is_supply(name: str) -> bool:
+    return bool(_SUPPLY.search(name)) and not _CONSEQUENCE.search(name)
 
 
 def _command(columns: Columns, role: str, name: str) -> str:

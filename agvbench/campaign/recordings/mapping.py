@@ -21,6 +21,7 @@ from agvbench.validation import convert
 from agvbench.vehicle.quaternion import Axis
 from agvbench.vehicle.wheels import WheelCommand
 
+_MOST_LOGGED, _LONGEST_NAME = 64, 60
 _NAMES_OF_POSES = frozenset(column.name for column in POSES)
 ISO_8601 = "iso8601"
 _DELIMITERS = ",;\t|: /#&!~^*%$"
@@ -278,8 +279,8 @@ def _check(mapping: Mapping, path: Path) -> None:
     if mapping.schema != SCHEMA:
         remedy = "install a newer agvbench" if mapping.schema > SCHEMA else f"set schema = {SCHEMA}"
         raise FileError("schema is unknown", where=path, value=mapping.schema, limit=str(SCHEMA), remedy=remedy)
-    _check_sources(mapping, path)
     _check_logged(mapping, path)
+    _check_sources(mapping, path)
     for name, quantity, known in quantities(mapping):
         factor(quantity.unit, known, f"{path}: columns.{name}.unit")
     columns = mapping.columns
@@ -341,10 +342,17 @@ def _check_sources(mapping: Mapping, path: Path) -> None:
 
 
 def _check_logged(mapping: Mapping, path: Path) -> None:
-    """Raise `FileError` if a further column has a name that the campaign uses itself."""
+    """Raise `FileError` if there are too many further columns, or the campaign cannot have one of such a name."""
+    remedy = "give it another name"
+    if len(mapping.logged) > _MOST_LOGGED:
+        count, limit = len(mapping.logged), f"at most {_MOST_LOGGED}"
+        raise FileError("[logged] has too many columns", where=path, value=count, limit=limit, remedy="delete some")
     for name in mapping.logged:
+        if not name.isprintable() or not name.strip() or len(name) > _LONGEST_NAME:
+            limit = f"1 to {_LONGEST_NAME} printable characters"
+            shown = ascii(name[:_LONGEST_NAME])
+            raise FileError("[logged] has an unusable name", where=path, value=shown, limit=limit, remedy=remedy)
         if name in _NAMES_OF_POSES:
-            remedy = "give it another name"
             raise FileError("the poses have a column of this name", where=path, value=f"logged.{name}", remedy=remedy)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numbers
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -127,7 +127,8 @@ def logged_columns(
     """
     used: list[LoggedColumn] = []
     left_out: dict[str, str] = {}
-    order = np.unique([run.started_s for run in runs], return_inverse=True)[1].astype(np.float64)
+    started_s = np.array([run.started_s for run in runs])
+    order = _rank(started_s)
     room = LOGGED.max_regressors
     for name, column in _columns(runs, t_s, before_s):
         shown = name if name.isprintable() else ascii(name)
@@ -135,7 +136,7 @@ def logged_columns(
         try:
             if isinstance(column, str):
                 raise _LeftOutError(column)
-            _require_covariate(column, order, {other.name for other in used})
+            _require_covariate(column, started_s + t_s[:, 0], {other.name for other in used})
             if _size(column) > room:
                 raise _LeftOutError(f"more than {LOGGED.max_regressors} regressors: delete columns that cannot matter")
         except _LeftOutError as reason:
@@ -146,6 +147,10 @@ def logged_columns(
     if used and room and not _is_time(order, started_h):
         used.append(LoggedColumn(RUN_ORDER, np.repeat(order[:, None], t_s.shape[1], axis=1)))
     return _standardised(used, left_out)
+
+
+def _rank(values: Floats) -> Floats:
+    return np.unique(values, return_inverse=True)[1].astype(np.float64)
 
 
 def _size(column: LoggedColumn) -> int:
@@ -167,8 +172,8 @@ def _columns(runs: Sequence[Run], t_s: Floats, before_s: Floats | None) -> Itera
         if name in cells:
             yield f"{name} (poses)", "runs have a column of this name"
         else:
-            before = None if before_s is None else _series(runs, name, before_s)
-            yield name, LoggedColumn(name, _series(runs, name, t_s), before=before)
+            before = None if before_s is None else _series(runs, name, before_s, _held)
+            yield name, LoggedColumn(name, _series(runs, name, t_s, _at), before=before)
 
 
 def _is_written(name: str) -> bool:
@@ -221,24 +226,32 @@ def _of_texts(name: str, cells: list[str | None], samples: int) -> LoggedColumn:
     return LoggedColumn(name, np.repeat(values[:, None], samples, axis=1), tuple(levels) or ("",))
 
 
-def _series(runs: Sequence[Run], name: str, t_s: Floats) -> Floats:
-    """Return a series of each run at its times `t_s` (R, n)."""
-    return np.array([_at(run.logged.get(name), own) for run, own in zip(runs, t_s, strict=True)])
+def _series(runs: Sequence[Run], name: str, t_s: Floats, evaluate: Callable[[Floats, TimeSeries], Floats]) -> Floats:
+    """Return a series of each run at its times `t_s` (R, n); NaN in a run without a finite value."""
+    out = np.full(t_s.shape, np.nan)
+    for row, run, own in zip(out, runs, t_s, strict=True):
+        if (series := run.logged.get(name)) is None:
+            continue
+        known = np.isfinite(series.t_s) & np.isfinite(_finite(series.value))
+        order = np.argsort(series.t_s[known], kind="stable")
+        if len(order):
+            row[:] = evaluate(own, TimeSeries(series.t_s[known][order], series.value[known][order]))
+    return out
 
 
-def _at(series: TimeSeries | None, t_s: Floats) -> Floats:
-    """Return a series, interpolated at `t_s` (n,) between its finite values; NaN if it has none."""
-    if series is None:
-        return np.full(len(t_s), np.nan)
-    known = np.isfinite(series.t_s) & np.isfinite(_finite(series.value))
-    if not known.any():
-        return np.full(len(t_s), np.nan)
-    order = np.argsort(series.t_s[known], kind="stable")
-    return np.interp(t_s, series.t_s[known][order], series.value[known][order])
+def _at(t_s: Floats, series: TimeSeries) -> Floats:
+    """Return a series of finite values in order, interpolated at `t_s` (n,)."""
+    return np.interp(t_s, series.t_s, series.value)
 
 
-def _require_covariate(column: LoggedColumn, order: Floats, taken: set[str]) -> None:
-    """Raise `_LeftOutError` if a column cannot be a covariate; `order` (R,) is the order of the runs."""
+def _held(t_s: Floats, series: TimeSeries) -> Floats:
+    """Return the last value of a series at or before each of `t_s` (n,); NaN before the first one."""
+    index = np.searchsorted(series.t_s, t_s, side="right") - 1
+    return np.where(index >= 0, series.value[np.maximum(index, 0)], np.nan)
+
+
+def _require_covariate(column: LoggedColumn, begins_s: Floats, taken: set[str]) -> None:
+    """Raise `_LeftOutError` if a column cannot be a covariate; runs or windows begin at `begins_s` (R,)."""
     name, per_run = column.name, column.per_run
     known = np.isfinite(per_run)
     if len(name) > _LONGEST_NAME or not name.isprintable() or not name.strip():
@@ -249,18 +262,24 @@ def _require_covariate(column: LoggedColumn, order: Floats, taken: set[str]) -> 
         raise _LeftOutError("an identifier, by its name")
     if np.count_nonzero(known) < LOGGED.min_runs:
         raise _LeftOutError(f"a value in {np.count_nonzero(known)} runs, fewer than {LOGGED.min_runs}")
-    every = column.values[np.isfinite(column.values)]
-    if np.ptp(every) <= _CONSTANT * np.max(np.abs(every)):
+    if _is_constant(column.values[np.isfinite(column.values)]):
         raise _LeftOutError("constant")
-    if not column.levels and _counts(per_run[known], order[known]):
+    if not column.levels and _counts(per_run[known], begins_s[known]):
         raise _LeftOutError("counts the runs: campaign_time_h and run_order are covariates")
 
 
-def _counts(values: Floats, order: Floats) -> bool:
+def _is_constant(values: Floats) -> bool:
+    return bool(np.ptp(values) <= _CONSTANT * np.max(np.abs(values)))
+
+
+def _counts(values: Floats, begins_s: Floats) -> bool:
     """Return whether numbers (R,) count the runs or are a clock: campaign time and run order stand for these."""
-    pairs = np.unique(np.column_stack([order, values]), axis=0)
-    increases = len(pairs) == len(np.unique(order)) and bool(np.all(np.diff(pairs[:, 1]) > 0.0))
-    return increases and (bool(np.all(values == np.round(values))) or _correlation(pairs[:, 0], pairs[:, 1]) > _SAME)
+    pairs = np.unique(np.column_stack([begins_s, values]), axis=0)
+    times_s, own = pairs.T
+    if len(pairs) > len(np.unique(begins_s)) or not np.all(np.diff(own) > 0.0):
+        return False
+    is_linear = max(_correlation(times_s, own), _correlation(_rank(times_s), own)) > _SAME
+    return is_linear or bool(np.all(values == np.round(values)))
 
 
 def _is_time(order: Floats, started_h: Floats) -> bool:
@@ -282,6 +301,8 @@ def _standardised(columns: list[LoggedColumn], left_out: Mapping[str, str]) -> L
         per_run = column.per_run
         known = np.isfinite(per_run)
         for level, value in _regressors(column, per_run):
+            if _is_constant(value[known]):
+                continue  # it varies within the runs, or within windows, only
             mean = float(np.mean(value[known]))
             deviation = max(float(np.std(value[known])), 1e-300)
             z = np.where(known, (value - mean) / deviation, 0.0)
