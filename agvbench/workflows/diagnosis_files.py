@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -177,6 +178,16 @@ def sessions_in_words(content: Mapping[str, Any]) -> Iterator[str]:
     yield from _varying_in_words(mapping(windows.get("varying")))
 
 
+def logged_in_words(content: Mapping[str, Any]) -> Iterator[str]:
+    """Yield which logged columns were not used, with the reasons."""
+    left_out = mapping(mapping(mapping(content.get("provenance")).get("logged_columns")).get("left_out"))
+    if left_out:
+        first = [f"{name} ({reason})" for name, reason in islice(left_out.items(), _MOST_LEFT_OUT)]
+        more = len(left_out) - len(first)
+        yield f"Logged columns that were not used: {', '.join(first)}{f', and {more} more' if more else ''}."
+
+
+_MOST_LEFT_OUT = 5
 _CLEARLY = 3.0
 _NOTICEABLE = {"gain": 0.03, "offset_rad": 0.005, "offset_per_m": 0.005, "offset_s": 0.02}
 _UNITS = {"offset_rad": "rad", "offset_per_m": "1/m", "offset_s": "s"}

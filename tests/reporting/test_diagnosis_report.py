@@ -176,3 +176,14 @@ def test_what_the_lack_of_fit_is_of_is_said():
     said = next(block for block in blocks if isinstance(block, Bullets)).items
     among = "against the repeatability in 67 validation and test runs"
     assert f"Lack of fit of the 35 test runs, {among}: p = 0.67." in said
+
+
+def test_logged_columns_that_were_not_used_are_listed_with_the_reasons():
+    left_out = {"odd_V": "constant", **{f"c{k}": "a value in 0 runs, fewer than 20" for k in range(6)}}
+    shown = content() | {"provenance": {"logged_columns": {"covariates": ["battery_V"], "left_out": left_out}}}
+    (bullets,) = (block for block in diagnosis_blocks(ShownDiagnosis(shown, None)) if isinstance(block, Bullets))
+    line = next(item for item in bullets.items if "Logged columns" in item)
+    assert line.startswith("Logged columns that were not used: odd_V (constant), c0 (a value in 0 runs")
+    assert line.endswith(", and 2 more.")
+    used = content() | {"provenance": {"logged_columns": {"covariates": ["battery_V"], "left_out": {}}}}
+    assert "Logged columns" not in str(diagnosis_blocks(ShownDiagnosis(used, None)))

@@ -23,6 +23,7 @@ from agvbench.workflows.diagnosis_files import (
     extrapolation_in_words,
     fit_in_words,
     left_in_words,
+    logged_in_words,
     next_in_words,
     remedies_in_words,
     sessions_in_words,
@@ -50,6 +51,7 @@ def print_diagnosis(found: Diagnosis, console: Console) -> None:
         if found.provenance.get("windows"):
             console.print(windows_table(content))
         _say((*extrapolation_in_words(content), *sessions_in_words(content)), console)
+        _say(logged_in_words(content), console)
         if found.held_out.worse_on:
             _say([f"Worse than before on: {', '.join(found.held_out.worse_on)}."], console)
     _say((*states_in_words(content), *remedies_in_words(content), *next_in_words(content)), console)

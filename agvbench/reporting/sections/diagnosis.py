@@ -36,6 +36,7 @@ from agvbench.workflows.diagnosis_files import (
     fit_in_words,
     items,
     left_in_words,
+    logged_in_words,
     mapping,
     next_in_words,
     number,
@@ -91,7 +92,8 @@ def diagnosis_blocks(shown: ShownDiagnosis) -> list[Block]:
     blocks += [block for block in found if not isinstance(block, Table) or block.rows]
     said = (
         *left_in_words(content), *term_in_words(content), *fit_in_words(content), *extrapolation_in_words(content),
-        *sessions_in_words(content), *remedies_in_words(content), *next_in_words(content), *shown.problems,
+        *sessions_in_words(content), *logged_in_words(content), *remedies_in_words(content), *next_in_words(content),
+        *shown.problems,
     )  # fmt: skip
     sentences = [plain_sentences(text) for text in said]
     if sentences:
