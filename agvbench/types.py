@@ -222,10 +222,17 @@ def kept_by_frames(measure: Callable[Concatenate[Frames, _P], _T]) -> Callable[C
 
 
 class TimeSeries(NamedTuple):
-    """A quantity that was logged with the poses of a run: ``t_s`` (n,) [s] and ``value`` (n,), NaN where unknown."""
+    """A quantity at times of its own: ``t_s`` (n,) [s] and ``value`` (n,), NaN where unknown."""
 
     t_s: Floats
     value: Floats
+
+    def held_at(self, t_s: Floats) -> Floats:
+        """Return the value that holds at each of `t_s`, if times are in order; NaN before the first."""
+        if not len(self.t_s):
+            return np.full(len(t_s), np.nan)
+        index = np.searchsorted(self.t_s, t_s, side="right") - 1
+        return np.where(index >= 0, self.value[index], np.nan)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from agvbench.campaign.tables.command_columns import by_role, command_columns
 from agvbench.campaign.tables.consistency import check_commands, check_poses, check_runs
 from agvbench.campaign.tables.motion_checks import check_motion
 from agvbench.campaign.tables.parts import part_name
-from agvbench.campaign.tables.schema import POSES, RUNS, TABLES, numbers
+from agvbench.campaign.tables.schema import NAMES_OF_POSES, POSES, RUNS, TABLES, numbers
 from agvbench.campaign.tables.source import SUFFIXES, Source
 from agvbench.campaign.tables.timed_table import TimedTable, blank_untracked
 from agvbench.errors import CampaignError
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _KNOWN = frozenset(column.name for column in RUNS)
-_KNOWN_OF_POSES = frozenset(column.name for column in POSES)
 _FRAME_COLUMNS = tuple(field.name for field in fields(Frames))
 
 
@@ -116,7 +115,7 @@ class Campaign:
     def _logged(self) -> dict[str, Floats]:
         """The further columns of the poses table that are numbers (rows,), by name; NaN where a cell is empty."""
         table = self._poses.table
-        further = {name: numbers(table[name]) for name in table.column_names if name not in _KNOWN_OF_POSES}
+        further = {name: numbers(table[name]) for name in table.column_names if name not in NAMES_OF_POSES}
         return {name: values for name, values in further.items() if values is not None}
 
     @cached_property

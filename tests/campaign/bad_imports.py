@@ -28,6 +28,10 @@ def _mapping(old: str, new: str) -> Callable[[], None]:
     return lambda: _import(MAPPING.replace(old, new))
 
 
+def _logged(lines: str, **changes: list[Any] | None) -> Callable[[], None]:
+    return lambda: _import(f"{MAPPING}[logged]\n{lines}\n", **changes)
+
+
 def _cell(column: str, row: int, value: object) -> Callable[[], None]:
     values = recording()[column]
     values[row] = value
@@ -82,35 +86,35 @@ CASES: Cases = {
     "mapping-wheelbase": ("a wheelbase of 0 m", _mapping("front_axle_m = 0.1", "front_axle_m = -0.1")),
     "mapping-logged-name": (
         "a further column with the name of one of the campaign's own",
-        lambda: _import(MAPPING + '[logged]\nx_m = { column = "X" }\n'),
+        _logged('x_m = { column = "X" }'),
     ),
     "mapping-logged-empty": (
         "a further column without a name",
-        lambda: _import(MAPPING + '[logged]\n"" = { column = "X" }\n'),
+        _logged('"" = { column = "X" }'),
     ),
     "mapping-logged-many": (
         "65 further columns",
-        lambda: _import(MAPPING + "[logged]\n" + "".join(f'c{k} = {{ column = "X" }}\n' for k in range(65))),
+        _logged("\n".join(f'c{k} = {{ column = "X" }}' for k in range(65))),
     ),
     "mapping-logged-key": (
         "a misspelt key of a further column",
-        lambda: _import(MAPPING + '[logged]\na = { column = "X" }\nvolts = { colunm = "X" }\n'),
+        _logged('a = { column = "X" }\nvolts = { colunm = "X" }'),
     ),
     "mapping-logged-scale": (
         "text as the scale of a further column",
-        lambda: _import(MAPPING + '[logged]\nvolts = { column = "X", scale = "2" }\n'),
+        _logged('volts = { column = "X", scale = "2" }'),
     ),
     "recording-logged-overflow": (
         "a further column whose scale makes a cell infinite",
-        lambda: _import(MAPPING + '[logged]\nvolts = { column = "X", scale = 1e12 }\n', X=["1e300"] * 60),
+        _logged('volts = { column = "X", scale = 1e12 }', X=["1e300"] * 60),
     ),
     "mapping-logged-topic": (
         "a topic of a further column, for a CSV",
-        lambda: _import(MAPPING + '[logged]\nvolts = { column = "X", topic = "/volts" }\n'),
+        _logged('volts = { column = "X", topic = "/volts" }'),
     ),
     "recording-logged-column": (
         "a further column that the CSV lacks",
-        lambda: _import(MAPPING + '[logged]\nvolts = { column = "volts" }\n'),
+        _logged('volts = { column = "volts" }'),
     ),
     "recording-absent": ("a recording that does not exist", lambda: _import(files=("s.csv",))),
     "recording-none": ("no recordings", lambda: _import(files=())),

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from ros_bags import BEGAN_NS, DIFFERENTIAL, KINDS, Sent, circle, command_ns, driven, write_bag
 
 from agvbench.campaign import Campaign, import_recordings
-from agvbench.campaign.recordings.recording import Series
 from agvbench.cli import main
+from agvbench.types import TimeSeries
 
 
 def imported(folder: Path, sent: list[Sent], mapping: str = DIFFERENTIAL, *, kind: str = "mcap") -> Campaign:
@@ -199,7 +199,7 @@ def test_each_pose_has_the_command_that_held_then(poses_ns, commands_ns, numbers
     mapping = DIFFERENTIAL.replace("shortest_s = 0.1", "shortest_s = 0.0\ngap_s = 10.0")
     run = next(iter(imported(folder, sorted(sent, key=lambda m: m.ns), mapping, kind=kind)))
     np.testing.assert_allclose(run.frames.x_m, np.array(poses_ns) * 1e-9, atol=1e-12)
-    held = Series(run.commands.t_s, run.commands.drive).held_at(run.frames.t_s + 1e-12)
+    held = TimeSeries(run.commands.t_s, run.commands.drive).held_at(run.frames.t_s + 1e-12)
     expected = [values[max(i for i, at in enumerate(commands_ns) if at <= ns)] for ns in poses_ns]
     np.testing.assert_array_equal(held, expected)
 

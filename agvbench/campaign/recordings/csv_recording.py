@@ -12,11 +12,11 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from agvbench.campaign.recordings.mapping import ISO_8601, TIME, Flag, Mapping, Signal, factor, quantities
-from agvbench.campaign.recordings.recording import Mask, Poses, Recording, Series, combine
+from agvbench.campaign.recordings.recording import Mask, Poses, Recording, combine
 from agvbench.campaign.tables.csv_text import read_csv_text
 from agvbench.campaign.tables.schema import UNKNOWN_COUNT, ColumnSpec, Kind, fill_columns, type_columns
 from agvbench.errors import FileError
-from agvbench.types import Floats
+from agvbench.types import Floats, TimeSeries
 from agvbench.vehicle.quaternion import heading_of
 
 
@@ -137,13 +137,13 @@ class Cells:
             )
         return t_s
 
-    def series(self, signals: Named[str, Signal], t_s: Floats) -> dict[str, Series]:
+    def series(self, signals: Named[str, Signal], t_s: Floats) -> dict[str, TimeSeries]:
         """Return the values of `signals` by name, given at `t_s`; an empty cell repeats the one before."""
         found = {}
         for name, signal in signals.items():
             values = self.number(signal.column, signal.scale, signal.offset)
             given = np.isfinite(values)
-            found[name] = Series(t_s[given], values[given])
+            found[name] = TimeSeries(t_s[given], values[given])
         return found
 
     def flag(self, flag: Flag) -> Mask:

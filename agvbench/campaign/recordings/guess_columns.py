@@ -15,6 +15,7 @@ from agvbench.campaign.recordings.guess_channels import guess_channels, question
 from agvbench.errors import FileError, OneOf
 from agvbench.types import Floats
 from agvbench.vehicle.channel_tables import channel_names
+from agvbench.vehicle.channels import ROLES
 
 _MOVING_SHARE = 0.2
 _MARGIN = 1.5
@@ -32,7 +33,6 @@ _NAMES = {
     "driven": r"arm|enable|auto|active|safety|dead ?man",
     "tracked": r"track|valid|seen|visible|pose new",
 }
-_COMMANDS = ("drive", "front", "rear")
 _TURNS = re.compile(r"cmd w|w cmd|omega|angular|yaw")
 # What may change how fast a vehicle drives; a current or a power is a consequence of how it drives.
 _SUPPLY = re.compile(r"batt|volt|supply|temperature")
@@ -63,7 +63,7 @@ class Columns:
         pattern = re.compile(_NAMES[role])
         free = [name for name in (self.numbers if among is None else among) if name not in self.taken.values()]
         fitting = [name for name in free if pattern.search(plain(name))]
-        if role in _COMMANDS:
+        if role in ROLES:
             fitting = [name for name in fitting if not _NO_COMMAND.search(plain(name))]
         if not fitting:
             return None

@@ -13,7 +13,7 @@ import msgspec
 
 from agvbench.campaign import header
 from agvbench.campaign.header import SCHEMA, CampaignHeader
-from agvbench.campaign.tables.schema import POSES
+from agvbench.campaign.tables.schema import LONGEST_NAME, NAMES_OF_POSES, can_name_column
 from agvbench.errors import FileError, InputError, OneOf
 from agvbench.text_files import read_toml
 from agvbench.types import Command
@@ -21,8 +21,7 @@ from agvbench.validation import convert
 from agvbench.vehicle.quaternion import Axis
 from agvbench.vehicle.wheels import WheelCommand
 
-_MOST_LOGGED, _LONGEST_NAME = 64, 60
-_NAMES_OF_POSES = frozenset(column.name for column in POSES)
+_MOST_LOGGED = 64
 ISO_8601 = "iso8601"
 _DELIMITERS = ",;\t|: /#&!~^*%$"
 _SHIPPED = Path(__file__).parent / "mappings"
@@ -222,6 +221,12 @@ class Mapping(_Strict, frozen=True):
         flags = {"driven": self.columns.driven, "tracked": self.columns.tracked}
         return {name: flag for name, flag in flags.items() if flag is not None}
 
+    @property
+    def sources(self) -> dict[str, Signal | Flag]:
+        """Where commands, flags and further columns come from, by their keys in the file."""
+        columns = {f"columns.{name}": source for name, source in (self.commands | self.flags).items()}
+        return {**columns, **{f"logged.{name}": source for name, source in self.logged.items()}}
+
     def header(self, path: Path) -> CampaignHeader:
         """Return the campaign's head by this mapping, read from `path`; raise `CampaignError` if it is impossible."""
         return CampaignHeader.from_tables(
@@ -332,8 +337,7 @@ def _check_sources(mapping: Mapping, path: Path) -> None:
         if getattr(columns, name) is not None:
             remedy = "delete it, or [pose]"
             raise FileError(f"columns.{name} has no meaning beside [pose]", where=path, remedy=remedy)
-    named = {f"columns.{name}": source for name, source in {**mapping.commands, **mapping.flags}.items()}
-    for key, source in {**named, **{f"logged.{name}": source for name, source in mapping.logged.items()}}.items():
+    for key, source in mapping.sources.items():
         if is_bag and source.topic is None:
             raise FileError("key 'topic' is missing", where=f"{path}: {key}", remedy=_SEE_ROS)
         if source.topic is not None and not is_bag:
@@ -348,11 +352,11 @@ def _check_logged(mapping: Mapping, path: Path) -> None:
         count, limit = len(mapping.logged), f"at most {_MOST_LOGGED}"
         raise FileError("[logged] has too many columns", where=path, value=count, limit=limit, remedy="delete some")
     for name in mapping.logged:
-        if not name.isprintable() or not name.strip() or len(name) > _LONGEST_NAME:
-            limit = f"1 to {_LONGEST_NAME} printable characters"
-            shown = ascii(name[:_LONGEST_NAME])
+        if not can_name_column(name):
+            limit = f"1 to {LONGEST_NAME} printable characters"
+            shown = ascii(name[:LONGEST_NAME])
             raise FileError("[logged] has an unusable name", where=path, value=shown, limit=limit, remedy=remedy)
-        if name in _NAMES_OF_POSES:
+        if name in NAMES_OF_POSES:
             raise FileError("the poses have a column of this name", where=path, value=f"logged.{name}", remedy=remedy)
 
 

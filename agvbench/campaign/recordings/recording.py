@@ -14,26 +14,11 @@ from agvbench.campaign.recordings.jump_detection import jumped
 from agvbench.campaign.recordings.mapping import Mapping
 from agvbench.campaign.tables.schema import UNKNOWN_COUNT
 from agvbench.errors import FileError
-from agvbench.types import Commands, Floats
+from agvbench.types import Commands, Floats, TimeSeries
 from agvbench.vehicle.channels import ROLES
 from agvbench.vehicle.wheels import WheelCommand
 
 Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Series:
-    """A quantity at times of its own: ``t_s`` (n,) [s] in order, and ``value`` (n,), each held until the next."""
-
-    t_s: Floats
-    value: Floats
-
-    def held_at(self, t_s: Floats) -> Floats:
-        """Return the value that holds at each of `t_s`; NaN before the first."""
-        if not len(self.t_s):
-            return np.full(len(t_s), np.nan)
-        index = np.searchsorted(self.t_s, t_s, side="right") - 1
-        return np.where(index >= 0, self.value[index], np.nan)
 
 
 @dataclass(frozen=True)
@@ -82,7 +67,7 @@ class Recording:
     driven: Mask
     cut: NDArray[np.int64]
     origin_s: float = 0.0
-    logged: Named[str, Series] = field(default_factory=dict)
+    logged: Named[str, TimeSeries] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.poses.t_s)
@@ -117,11 +102,11 @@ def combine(
     files: tuple[Path, ...],
     mapping: Mapping,
     poses: Poses,
-    commands: Named[str, Series],
+    commands: Named[str, TimeSeries],
     flags: Named[str, Mask],
     cut: NDArray[np.int64] | None = None,
     *,
-    logged: Named[str, Series] | None = None,
+    logged: Named[str, TimeSeries] | None = None,
     origin_s: float = 0.0,
 ) -> Recording:
     """Return the recording of these poses and commands (by role); a role without commands stays at neutral.
@@ -149,7 +134,7 @@ def combine(
     return Recording(path, files, poses, together, seen, wild, driven, stretches, origin_s, logged or {})
 
 
-def _together(commands: Named[str, Series], header: CampaignHeader) -> Commands:
+def _together(commands: Named[str, TimeSeries], header: CampaignHeader) -> Commands:
     """Return one row for each time at which a command was given, once all are known; wheels as the body's motion."""
     times = np.unique(np.concatenate([series.t_s for series in commands.values()]))
     held = {name: series.held_at(times) for name, series in commands.items()}

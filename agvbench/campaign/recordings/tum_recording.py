@@ -9,11 +9,11 @@ import numpy as np
 
 from agvbench.campaign.recordings.csv_recording import Cells
 from agvbench.campaign.recordings.mapping import Mapping, PoseSource
-from agvbench.campaign.recordings.recording import Poses, Recording, Series, combine
+from agvbench.campaign.recordings.recording import Poses, Recording, combine
 from agvbench.campaign.tables.csv_text import MAX_BYTES
 from agvbench.errors import FileError
 from agvbench.text_files import require_regular
-from agvbench.types import Floats
+from agvbench.types import Floats, TimeSeries
 from agvbench.vehicle.quaternion import floor_poses
 
 _COLUMNS = "t x y z qx qy qz qw"
@@ -35,7 +35,7 @@ def read_tum_recording(path: Path, mapping: Mapping) -> Recording:
     cells = Cells(beside, mapping)
     t_s = cells.time()
     flags = {
-        name: Series(t_s, cells.flag(flag).astype(np.float64)).held_at(poses.t_s) == 1.0
+        name: TimeSeries(t_s, cells.flag(flag).astype(np.float64)).held_at(poses.t_s) == 1.0
         for name, flag in mapping.flags.items()
     }
     commands, logged = cells.series(mapping.commands, t_s), cells.series(mapping.logged, t_s)

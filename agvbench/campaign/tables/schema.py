@@ -43,8 +43,16 @@ POSES = (
     *_columns("count", "frame", required=False),
     *_columns("number", "mean_error_m received_s", required=False),
 )
+NAMES_OF_POSES = frozenset(column.name for column in POSES)
+"""Further columns of the poses have other names."""
+LONGEST_NAME = 60
 TABLES: dict[str, tuple[ColumnSpec, ...]] = {"runs": RUNS, "commands": COMMANDS, "poses": POSES}
 SPLITS = ("fit", "validation", "held_out")
+
+
+def can_name_column(name: str) -> bool:
+    """Return whether a further column can have this name: one that can be shown."""
+    return bool(name.strip()) and name.isprintable() and len(name) <= LONGEST_NAME
 
 
 _TYPES: dict[Kind, pa.DataType] = {"text": pa.string(), "number": pa.float64(), "count": pa.int64(), "flag": pa.bool_()}

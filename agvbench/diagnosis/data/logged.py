@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agvbench.campaign.tables.schema import LONGEST_NAME, can_name_column
 from agvbench.diagnosis.criteria import LOGGED
 from agvbench.types import Floats, Run, TimeSeries
 
@@ -30,7 +31,7 @@ _WRITTEN = frozenset({"duration_s", "events", "safety_stop", "source", "source_r
 _WRITTEN_PREFIX = "placing_"
 _FIRMWARE = "firmware"
 _IDENTIFIERS = ("id", "uuid", "_id", "_uuid")
-_LONGEST_NAME, _LARGEST_NUMBER, _STATED_AS_LEFT_OUT = 60, 1e100, 50
+_LARGEST_NUMBER, _STATED_AS_LEFT_OUT = 1e100, 50
 _CONSTANT, _SAME = 1e-9, 0.9999
 
 
@@ -132,7 +133,7 @@ def logged_columns(
     room = LOGGED.max_regressors
     for name, column in _columns(runs, t_s, before_s):
         shown = name if name.isprintable() else ascii(name)
-        label = shown if len(shown) <= _LONGEST_NAME else f"{shown[:_LONGEST_NAME]}…"
+        label = shown if len(shown) <= LONGEST_NAME else f"{shown[:LONGEST_NAME]}…"
         try:
             if isinstance(column, str):
                 raise _LeftOutError(column)
@@ -172,8 +173,8 @@ def _columns(runs: Sequence[Run], t_s: Floats, before_s: Floats | None) -> Itera
         if name in cells:
             yield f"{name} (poses)", "runs have a column of this name"
         else:
-            before = None if before_s is None else _series(runs, name, before_s, _held)
-            yield name, LoggedColumn(name, _series(runs, name, t_s, _at), before=before)
+            before = None if before_s is None else _series(runs, name, before_s, TimeSeries.held_at)
+            yield name, LoggedColumn(name, _series(runs, name, t_s, _interpolated), before=before)
 
 
 def _is_written(name: str) -> bool:
@@ -200,7 +201,7 @@ def _is_number(cell: object) -> bool:
 
 def _as_numbers(cells: list[Any]) -> Floats | None:
     """Return numbers (R,), NaN where there is none or it is not finite; None if a cell is no number."""
-    if any(isinstance(cell, bool) or (isinstance(cell, str) and len(cell) > _LONGEST_NAME) for cell in cells):
+    if any(isinstance(cell, bool) or (isinstance(cell, str) and len(cell) > LONGEST_NAME) for cell in cells):
         return None
     try:
         return _finite(np.array([np.nan if cell is None else float(cell) for cell in cells]))
@@ -226,7 +227,7 @@ def _of_texts(name: str, cells: list[str | None], samples: int) -> LoggedColumn:
     return LoggedColumn(name, np.repeat(values[:, None], samples, axis=1), tuple(levels) or ("",))
 
 
-def _series(runs: Sequence[Run], name: str, t_s: Floats, evaluate: Callable[[Floats, TimeSeries], Floats]) -> Floats:
+def _series(runs: Sequence[Run], name: str, t_s: Floats, evaluate: Callable[[TimeSeries, Floats], Floats]) -> Floats:
     """Return a series of each run at its times `t_s` (R, n); NaN in a run without a finite value."""
     out = np.full(t_s.shape, np.nan)
     for row, run, own in zip(out, runs, t_s, strict=True):
@@ -235,27 +236,20 @@ def _series(runs: Sequence[Run], name: str, t_s: Floats, evaluate: Callable[[Flo
         known = np.isfinite(series.t_s) & np.isfinite(_finite(series.value))
         order = np.argsort(series.t_s[known], kind="stable")
         if len(order):
-            row[:] = evaluate(own, TimeSeries(series.t_s[known][order], series.value[known][order]))
+            row[:] = evaluate(TimeSeries(series.t_s[known][order], series.value[known][order]), own)
     return out
 
 
-def _at(t_s: Floats, series: TimeSeries) -> Floats:
-    """Return a series of finite values in order, interpolated at `t_s` (n,)."""
+def _interpolated(series: TimeSeries, t_s: Floats) -> Floats:
     return np.interp(t_s, series.t_s, series.value)
-
-
-def _held(t_s: Floats, series: TimeSeries) -> Floats:
-    """Return the last value of a series at or before each of `t_s` (n,); NaN before the first one."""
-    index = np.searchsorted(series.t_s, t_s, side="right") - 1
-    return np.where(index >= 0, series.value[np.maximum(index, 0)], np.nan)
 
 
 def _require_covariate(column: LoggedColumn, begins_s: Floats, taken: set[str]) -> None:
     """Raise `_LeftOutError` if a column cannot be a covariate; runs or windows begin at `begins_s` (R,)."""
     name, per_run = column.name, column.per_run
     known = np.isfinite(per_run)
-    if len(name) > _LONGEST_NAME or not name.isprintable() or not name.strip():
-        raise _LeftOutError(f"its name is empty, longer than {_LONGEST_NAME} characters or not printable")
+    if not can_name_column(name):
+        raise _LeftOutError(f"its name is empty, longer than {LONGEST_NAME} characters or not printable")
     if name in COMPUTED | taken:
         raise _LeftOutError("the diagnosis has a covariate of this name: rename it")
     if name.lower().endswith(_IDENTIFIERS[2:]) or name.lower() in _IDENTIFIERS[:2]:

@@ -137,8 +137,8 @@ class Weighted:
         count = by_random_effects.shape[-1]
         prior = np.empty((len(readings), count))
         prior[:, :2] = np.hypot(readings.start_stderr[:, :2], _START_M)
-        prior[:, 2] = np.hypot(readings.start_stderr[:, 2], np.hypot(variance_components.random_effects[0], _START_RAD))
-        prior[:, 3:] = variance_components.random_effects[1 : count - 2]
+        prior[:, 2:] = variance_components.random_effects[: count - 2]
+        prior[:, 2] = np.hypot(readings.start_stderr[:, 2], np.hypot(prior[:, 2], _START_RAD))
         self._a = self.columns(by_random_effects)
         inner = self._a.transpose(0, 2, 1) @ self._a
         inner[:, range(count), range(count)] += prior**-2.0

@@ -86,7 +86,7 @@ def _by_logged_column(extended: Selector, root: ScoredModel, term: type[ByLogged
 
 
 def terms_without_regression(extended: Selector) -> list[type[DiscrepancyTerm]]:
-    """Return the terms that this vehicle can have, without those whose logged column only a regression can choose."""
+    """Return the terms that this vehicle can have, without those of logged columns: the regression tries each."""
     return [term for term in TERMS if not issubclass(term, ByLoggedColumn) and applies(term, extended.batch.geometry)]
 
 

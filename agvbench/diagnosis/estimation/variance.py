@@ -1,9 +1,9 @@
 """Variance components of measurements and runs: initial values, updates, and the weights and priors that follow.
 
 The errors of windows of free driving grow with time and have heavy tails: on another day they may be many times as
-large. The likelihood of a window is therefore Student's t, with the window and
-not the sample as unit. That of a run is, too, where the model lacks a cause: a few runs then have errors that are many
-times as large, and would otherwise determine the parameters.
+large. The likelihood of a window is therefore Student's t, with the window and not the sample as unit. That of a run
+is, too, where the model lacks a cause: a few runs then have errors that are many times as large, and would otherwise
+determine the parameters.
 """
 
 from __future__ import annotations
@@ -107,11 +107,10 @@ def weights(predictor: Predictor, variance_components: VarianceComponents) -> Fl
 def priors(predictor: Predictor, variance_components: VarianceComponents) -> Floats:
     """Return the prior standard deviations of each run's q random effects, (R, q)."""
     start = np.hypot(predictor.readings.start_stderr, _START_EXTRA_M)
-    count = len(predictor.random_effects)
-    out = np.empty((len(predictor.readings), count))
+    out = np.empty((len(predictor.readings), len(predictor.random_effects)))
     out[:, :2] = start[:, :2]
-    out[:, 2] = np.hypot(start[:, 2], variance_components.random_effects[0])
-    out[:, 3:] = variance_components.random_effects[1 : count - 2]
+    out[:, 2:] = variance_components.random_effects[: out.shape[1] - 2]
+    out[:, 2] = np.hypot(start[:, 2], out[:, 2])
     return out
 
 

@@ -190,9 +190,7 @@ class WindowConclusion:
 
     @cached_property
     def _chosen(self) -> VaryingModel:
-        fitted, nodal = self.selection.chosen.fit, slice(self.selector.batch.maps.size)
-        predictor = Predictor(self._every, fitted.predictor.effects)
-        return VaryingModel(predictor, fitted.parameters, fitted.covariance[nodal, nodal])
+        return VaryingModel.of(self.selection.chosen.fit, self._every)
 
     @cached_property
     def _residuals(self) -> WindowResiduals:

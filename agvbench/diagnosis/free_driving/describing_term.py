@@ -123,8 +123,8 @@ def _roots(selection: Selection, selector: WindowSelector) -> Iterator[tuple[Sco
     yield chosen, DiscrepancyTerm
     if 0 < len(selection.gains) <= _MOST_MIMICKING:
         yield selection.base, DiscrepancyTerm
-    if selector.batch.readings.logged.regressors:
-        for name in selection.gains if len(selection.gains) > 1 else ():
+    if selector.batch.readings.logged.regressors and len(selection.gains) > 1:
+        for name in selection.gains:
             yield selector.without_effect(selection.base, chosen, name), ByLoggedColumn
 
 

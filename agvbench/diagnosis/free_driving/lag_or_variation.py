@@ -13,7 +13,6 @@ from agvbench.diagnosis.free_driving.selection import LAGS, WindowSelector
 from agvbench.diagnosis.free_driving.varying_model import VaryingModel
 from agvbench.diagnosis.free_driving.varying_parameters import log_density_with_variation
 from agvbench.diagnosis.free_driving.window_residuals import WindowResiduals
-from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.actuators import ACTUATORS
 from agvbench.diagnosis.selection.fitted_models import ScoredModel
 from agvbench.diagnosis.selection.stepwise import Selection
@@ -45,9 +44,7 @@ def without_mimicking_lags(selection: Selection, selector: WindowSelector) -> Se
 
 def _deviance(model: ScoredModel) -> float:
     """Return minus two log posterior density of a model whose steering and drive vary, in its windows."""
-    fitted, maps = model.fit, slice(model.fit.predictor.maps.size)
-    varying = VaryingModel(
-        Predictor(fitted.predictor.batch, fitted.predictor.effects), fitted.parameters, fitted.covariance[maps, maps]
-    )
-    every = np.ones(len(fitted.predictor.readings), dtype=np.bool_)
+    batch = model.fit.predictor.batch
+    varying = VaryingModel.of(model.fit, batch)
+    every = np.ones(len(batch.readings), dtype=np.bool_)
     return -2.0 * log_density_with_variation(varying, WindowResiduals.of(varying), every)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
@@ -56,6 +57,10 @@ class WindowSelector(Selector):
     def max_loss_of_likely(self, current: ScoredModel) -> float:
         """Return a loss that is not much larger than that of `current`: windows have no random effects."""
         return current.fit.total_loss + VARIANT.max_fit_loss
+
+    def max_loss_of_further(self, current: ScoredModel, name: str) -> float:
+        """Return the loss with the least gain of an effect: what gains less in fit is not selected."""
+        return math.inf if cause_of(name) in self.always_fitted else current.fit.total_loss - self.min_gain
 
     def with_alternatives(self, selection: Selection) -> Selection:
         """Return a selection with the alternatives of its effects."""

@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from agvbench.diagnosis.criteria import VARYING
+from agvbench.diagnosis.estimation.fit import Fit
+from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.types import Floats
@@ -74,6 +76,13 @@ class VaryingModel:
     predictor: Predictor
     parameters: Floats
     covariance: Floats
+
+    @classmethod
+    def of(cls, fitted: Fit, batch: Batch) -> VaryingModel:
+        """Return a fitted model in the windows of a batch."""
+        maps = slice(batch.maps.size)
+        predictor = Predictor(batch, fitted.predictor.effects)
+        return cls(predictor, fitted.parameters, fitted.covariance[maps, maps])
 
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:

@@ -119,7 +119,11 @@ class Perturbations:
                 changed.append(change)
         kinds, index = np.array(kind), np.array(run)
         active = _active(rows_of_run, weights)
-        past, past_change = _past(base, index, [rows_of_run[i] for i in run], changed)
+        rows, row_change = np.concatenate([rows_of_run[i] for i in run]), np.concatenate(changed)
+        past = _past(base, index, rows, row_change) & (kinds != "heading")
+        past_change = np.zeros((len(base.row_runs), len(ROLES)))
+        of_past = np.repeat(past, [len(rows_of_run[i]) for i in run])
+        np.add.at(past_change, rows[of_past], row_change[of_past])
         return cls(
             by_node,
             index,
@@ -127,9 +131,9 @@ class Perturbations:
             active,
             kinds == "heading",
             _grouped(maps, weights, active, index, kinds, np.array(row), by_node=by_node),
-            np.concatenate([rows_of_run[i] for i in run]),
-            np.concatenate(changed),
-            past & (kinds != "heading"),
+            rows,
+            row_change,
+            past,
             past_change,
         )
 
@@ -142,18 +146,13 @@ def _active(rows_of_run: Sequence[Integers], weights: Mapping[str, Floats]) -> I
     return np.argsort(~used, axis=1, kind="stable")[:, : max(1, int(used.sum(axis=1).max()))]
 
 
-def _past(
-    base: Simulation, run: Integers, rows: Sequence[Integers], changed: Sequence[Floats]
-) -> tuple[NDArray[np.bool_], Floats]:
-    """Return which perturbations (n,) change commands before a window only, and the sum of their changes (rows, 3)."""
+def _past(base: Simulation, run: Integers, rows: Integers, row_change: Floats) -> NDArray[np.bool_]:
+    """Return which copies (n,) of each `run` change commands before a window only; `rows` (r,) are those of all."""
     ends_s = np.append(base.command_t_s[1:], np.inf)
     ends_s[base.row_starts[1:] - 1] = np.inf
-    past, total = np.zeros(len(run), dtype=np.bool_), np.zeros((len(ends_s), len(ROLES)))
-    for i, (own, change) in enumerate(zip(rows, changed, strict=True)):
-        past[i] = bool(np.all(ends_s[own[change.any(axis=1)]] <= base.begins_s[run[i]]))
-        if past[i]:
-            total[own] += change
-    return past, total
+    changed_until_s = np.where(row_change.any(axis=1), ends_s[rows], -np.inf)
+    first = np.concatenate([[0], np.cumsum(np.diff(base.row_starts)[run])[:-1]])
+    return np.asarray(np.maximum.reduceat(changed_until_s, first) <= base.begins_s[run])
 
 
 def _grouped(

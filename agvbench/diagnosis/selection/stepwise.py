@@ -120,7 +120,7 @@ class Selector(FittedModels):
             if self._is_unlikely(name, predicted[name]):
                 larger[name] = self.unfitted(current, name)
                 continue
-            larger[name] = model = self.with_effect(current, name, max_loss=self._max_loss_of_further(current, name))
+            larger[name] = model = self.with_effect(current, name, max_loss=self.max_loss_of_further(current, name))
             if self.improves(current, model):
                 accepted.append(model)
                 most = max(most, model.gain_over(current))
@@ -131,14 +131,12 @@ class Selector(FittedModels):
         share = self.criteria.likely_gain_share
         return share > 0.0 and predicted < share * self.min_gain and cause_of(name) not in self.always_fitted
 
-    def _max_loss_of_further(self, current: ScoredModel, name: str) -> float:
-        """Return the loss that `current` with one more effect must be expected to reach for its fit to be finished.
+    def max_loss_of_further(self, current: ScoredModel, name: str) -> float:
+        """Return the loss that a fit of one more effect must be expected to reach to be finished: any.
 
-        What gains too little in fit is not selected. Random effects of runs may change in further steps: there, any is.
+        In further steps random effects may give back much of a cause.
         """
-        if self.criteria.likely_gain_share == 0.0 or cause_of(name) in self.always_fitted:
-            return math.inf
-        return current.fit.total_loss - self.min_gain
+        return math.inf
 
     def is_improvable(self, current: ScoredModel) -> bool:
         """Return whether a further candidate improves a model; those that are predicted to gain too little do not."""

@@ -1,7 +1,7 @@
 """Discrepancy terms of quantities that depend on a column that the lab logged, such as a voltage or a temperature.
 
 Each is linear in the standardised column, by run or window: its size is that of one standard deviation. The number of
-the column is a parameter that the regression chooses, and that a fit leaves.
+the column is a parameter that a regression or a linearisation chooses, and that a fit leaves.
 """
 
 from __future__ import annotations

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from agvbench.campaign.recordings.bags.bag import Bag, Message
 from agvbench.campaign.recordings.bags.fields import Field, stamp_ns, vector
 from agvbench.campaign.recordings.mapping import Flag, Mapping, PoseSource, Signal, Stamp
-from agvbench.campaign.recordings.recording import Poses, Recording, Series, combine
+from agvbench.campaign.recordings.recording import Poses, Recording, combine
 from agvbench.errors import FileError
-from agvbench.types import Floats
+from agvbench.types import Floats, TimeSeries
 from agvbench.vehicle.quaternion import floor_poses
 
 MAX_MESSAGES = 10_000_000
@@ -46,13 +46,12 @@ def read_bag_recording(path: Path, mapping: Mapping) -> Recording:
         If the bag, a topic or a field is missing or cannot be read, stamps are zero, or time goes backwards.
     """
     with Bag(path) as bag:
-        logged = {f"logged.{name}": signal for name, signal in mapping.logged.items()}
-        content = read_content(bag, mapping.pose or PoseSource(), {**mapping.commands, **mapping.flags, **logged})
+        content = read_content(bag, mapping.pose or PoseSource(), mapping.sources)
         files = bag.files
-    commands = {role: content.series[role] for role in mapping.commands}
-    flags = {name: content.series[name].held_at(content.poses.t_s) == 1.0 for name in mapping.flags}
-    further = {name: content.series[f"logged.{name}"] for name in mapping.logged}
-    return combine(path, files, mapping, content.poses, commands, flags, logged=further, origin_s=content.origin_s)
+    commands = {role: content.series[f"columns.{role}"] for role in mapping.commands}
+    flags = {name: content.series[f"columns.{name}"].held_at(content.poses.t_s) == 1.0 for name in mapping.flags}
+    logged = {name: content.series[f"logged.{name}"] for name in mapping.logged}
+    return combine(path, files, mapping, content.poses, commands, flags, logged=logged, origin_s=content.origin_s)
 
 
 class BagContent(NamedTuple):
@@ -62,7 +61,7 @@ class BagContent(NamedTuple):
     """
 
     poses: Poses
-    series: dict[str, Series]
+    series: dict[str, TimeSeries]
     origin_s: float
 
 
@@ -149,10 +148,10 @@ class _SignalTrack(_Track):
             return float(str(found).strip().lower() == str(signal.equals).lower())
         return float(self._field.number(content) == signal.equals)
 
-    def series(self, origin_ns: int) -> Series:
+    def series(self, origin_ns: int) -> TimeSeries:
         """Return the values in order of their times [s] since `origin_ns`."""
         order, t_s, _ = self._in_order(origin_ns)
-        return Series(t_s, np.array(self._values)[order])
+        return TimeSeries(t_s, np.array(self._values)[order])
 
 
 class _PoseTrack(_Track):
