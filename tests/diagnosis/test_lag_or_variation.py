@@ -13,7 +13,7 @@ from agvbench.diagnosis import diagnose
     ("truth", "named", "most"),
     [
         (Tiny(per_volt=0.15), set(), 0.6),
-        (Tiny(per_volt=0.1, accelerate_s=0.3, brake_s=0.3), {"speed_lag"}, 0.7),
+        pytest.param(Tiny(per_volt=0.1, accelerate_s=0.3, brake_s=0.3), {"speed_lag"}, 0.7, marks=pytest.mark.slow),
         pytest.param(
             Tiny(per_volt=0.15, delay_s=0.1, steering_lag_s=0.1), {"actuation_delay"}, 0.4, marks=pytest.mark.slow
         ),

@@ -138,7 +138,11 @@ def test_a_supply_that_was_logged_explains_what_changes_within_a_recording(truth
     assert term["held_out_position_mm"]["with"] < 0.4 * term["held_out_position_mm"]["without"]
 
 
-@pytest.mark.parametrize("truth", [Tiny(), Tiny(per_volt=0.15)], ids=["nothing hidden", "another voltage matters"])
+@pytest.mark.parametrize(
+    "truth",
+    [Tiny(), pytest.param(Tiny(per_volt=0.15), marks=pytest.mark.slow)],
+    ids=["nothing hidden", "another voltage matters"],
+)
 def test_a_supply_that_matters_nothing_describes_nothing(truth):
     found = diagnose(InMemory(with_supply(truth, is_noise=truth.per_volt > 0.0), FREE_HEADER))
     assert "empirical_term" not in found.provenance
