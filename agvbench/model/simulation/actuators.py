@@ -65,6 +65,7 @@ from agvbench.model.simulation.servos import (
     INERT,
     LIMITED,
     SETTLED_S,
+    SOLUTIONS_SIZE,
     SPED_S,
     TURNS_S,
     WAY_SIZE,
@@ -81,9 +82,10 @@ from agvbench.types import Floats
 # A servo: a gap of first order, or a response of second order in the same place; then its axle, and the direction.
 _DIRECTION = FOLLOWER_SIZE
 _SERVO_SIZE = FOLLOWER_SIZE + 1
-_FRONT, _REAR = 0, _SERVO_SIZE
+_FRONT = SOLUTIONS_SIZE
+_REAR = _FRONT + _SERVO_SIZE
 # The drive: its initial gap, and if it reverses the gap from rest.
-_FIRST = 2 * _SERVO_SIZE
+_FIRST = _REAR + _SERVO_SIZE
 _SECOND = _FIRST + GAP_SIZE
 _SPEED_AIM, _SPEED_DIRECTION, _RESTS_S, _ORDER = range(_SECOND + GAP_SIZE, _SECOND + GAP_SIZE + 4)
 # A drive of second order: which equation it has, and the response of its speed, whose gap is speed − aim. An elastic
@@ -110,7 +112,7 @@ _LEAST_DAMPED = 0.4
 def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: float, lag: float, rate: float) -> None:
     plan_gap(plan, servo, abs(aim - position), lag, rate)
     plan[servo + AIM], plan[servo + _DIRECTION], plan[servo + AXLE] = aim, math.copysign(1.0, aim - position), axle
-    events, direction, half = _EVENTS + 4 * (servo > 0), plan[servo + _DIRECTION], plan[servo + HALF_BACKLASH]
+    events, direction, half = _EVENTS + 4 * (servo > _FRONT), plan[servo + _DIRECTION], plan[servo + HALF_BACKLASH]
     plan[events] = kink_s(plan, servo)
     plan[events + 1] = plan[servo + GAP_SETTLED_S]
     # The axle begins to follow; the axle passes the middle.
@@ -122,7 +124,7 @@ def _plan_servo(plan: Floats, servo: int, position: float, axle: float, aim: flo
 def _plan_second_order(
     plan: Floats, servo: int, position: float, turning: float, axle: float, aim: float, ratio: float, state: Floats
 ) -> None:
-    events = _EVENTS + 4 * (servo > 0)
+    events = _EVENTS + 4 * (servo > _FRONT)
     plan[servo + AIM], plan[servo + AXLE] = aim, axle
     plan[events] = plan[events + 2] = math.inf
     if plan[_ORDER] == INERT:
@@ -233,7 +235,8 @@ def _speed(plan: Floats, tau: float) -> float:
 
 
 @compiled(inner=True)
-def _speed_any_order(plan: Floats, tau: float) -> float:
+def speed_at(plan: Floats, tau: float) -> float:
+    """Return the drive's speed, `tau` seconds after the command took effect."""
     if plan[_DRIVE_ORDER] == _PLAIN:
         return _speed(plan, tau)
     return plan[_SPEED_AIM] + way_at(plan, _RESPONSE, INERT, tau)[0]
@@ -255,13 +258,13 @@ def actuate_any_order(plan: Floats, tau: float, state: Floats) -> None:
         actuate(plan, tau, state)
     else:
         state[FRONT], state[REAR] = way_axle(plan, _FRONT, order, tau), way_axle(plan, _REAR, order, tau)
-    state[SPEED] = _speed_any_order(plan, tau)
+    state[SPEED] = speed_at(plan, tau)
 
 
 @compiled(inner=True)
 def leave_command(plan: Floats, tau: float, servos: Floats) -> None:
     """Put positions, rates and speed at `tau`, where another command takes effect, into `servos`."""
-    servos[4], servos[8] = _speed_any_order(plan, tau), _windup(plan, tau)
+    servos[4], servos[8] = speed_at(plan, tau), _windup(plan, tau)
     servos[10] = 0.0 if plan[_DRIVE_ORDER] == _PLAIN else way_at(plan, _RESPONSE, INERT, tau)[1]
     order = plan[_ORDER]
     if order == FIRST_ORDER:

@@ -21,13 +21,19 @@ FIRST_ORDER, LIMITED, INERT = range(3)
 GAP, GAP_RATE, SETTLED_S, TURNS_S, TURNS_EVERY_S, _DECAY, _SQUARE, _TAU = range(8)
 SPED_S, CRUISED_S, _CRUISE, _ACCELERATION = range(5, 9)
 WAY_SIZE = 9
+# A plan begins with the homogeneous solutions computed last: decay, frequency squared and time, then cosine and
+# sine. Servos and drive of a differential vehicle have the same, and each is needed for the gap and for its rate.
+_OF_DECAY, _OF_SQUARE, _AT_S, _COSINE, _SINE, SOLUTIONS_SIZE = range(6)
 
 # Below this gap [rad] a servo counts as settled.
 _SETTLED = 1e-7
 # Length of a step in time constants: the first one, and its growth per time constant.
 _FIRST_STEP, _STEP_GROWTH = 0.7, 0.25
+# After this many time constants nothing is left of a decay.
+_DECAYED = 16.0
 _LONG = 20.0
-_BISECTIONS = 50
+# The search for a time: its precision [s], and its most iterations.
+_EXACT_S, _MOST_ITERATIONS = 1e-13, 60
 
 
 @compiled(inner=True)
@@ -80,7 +86,7 @@ def closes_s(plan: Floats, way: int) -> float:
 def crosses_s(plan: Floats, way: int, level: float) -> float:
     """Return when a response with inertia first has the gap `level`, between its initial gap and zero; ∞ if not.
 
-    There is no closed form: it is bisected up to the reversal behind the level.
+    There is no closed form: Newton's method, which falls back to bisection, finds it before the reversal behind it.
     """
     beyond = plan[way + GAP] > level
     if level == 0.0 or (level > 0.0) != beyond:
@@ -90,19 +96,35 @@ def crosses_s(plan: Floats, way: int, level: float) -> float:
         high = min(plan[way + TURNS_S] + plan[way + TURNS_EVERY_S], plan[way + SETTLED_S])
     if high == math.inf or (_inert(plan, way, high)[0] > level) == beyond:
         return math.inf
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        if (_inert(plan, way, middle)[0] > level) == beyond:
-            low = middle
+    at = 0.5 * (low + high)
+    for _ in range(_MOST_ITERATIONS):
+        gap, rate = _inert(plan, way, at)
+        if (gap > level) == beyond:
+            low = at
         else:
-            high = middle
-    return high
+            high = at
+        move = (level - gap) / rate  # infinite without a rate
+        if abs(move) < _EXACT_S or high - low < _EXACT_S:
+            break
+        at += move
+        if not low < at < high:
+            at = 0.5 * (low + high)
+    return at
 
 
 @compiled(inner=True)
 def _inert(plan: Floats, way: int, t: float) -> tuple[float, float]:
     decay, square, tau = plan[way + _DECAY], plan[way + _SQUARE], plan[way + _TAU]
+    if t != plan[_AT_S] or decay != plan[_OF_DECAY] or square != plan[_OF_SQUARE]:
+        _solve(plan, decay, square, tau, t)
+    c, s = plan[_COSINE], plan[_SINE]
     gap, rate = plan[way + GAP], plan[way + GAP_RATE]
+    return c * gap + s * (rate + decay * gap), c * rate - s * (decay * rate + gap / (tau * tau))
+
+
+@compiled(inner=True)
+def _solve(plan: Floats, decay: float, square: float, tau: float, t: float) -> None:
+    """Compute the homogeneous solutions exp(−decay t) cos(ω t) and exp(−decay t) sin(ω t) / ω."""
     frequency = math.sqrt(abs(square))
     if square >= 0.0:
         left = math.exp(-decay * t)
@@ -112,7 +134,7 @@ def _inert(plan: Floats, way: int, t: float) -> tuple[float, float]:
         left = math.exp(-t / (tau * tau * (decay + frequency)))
         lost = math.expm1(-2.0 * frequency * t)
         c, s = 0.5 * left * (2.0 + lost), -0.5 * left * lost / frequency
-    return c * gap + s * (rate + decay * gap), c * rate - s * (decay * rate + gap / (tau * tau))
+    plan[_OF_DECAY], plan[_OF_SQUARE], plan[_AT_S], plan[_COSINE], plan[_SINE] = decay, square, t, c, s
 
 
 @compiled(inner=True)
@@ -164,6 +186,9 @@ def longest_step(plan: Floats, way: int, order: int, t: float, longest: float) -
     if t >= plan[way + SETTLED_S] or order == LIMITED:
         return longest
     tau, decay, square = plan[way + _TAU], plan[way + _DECAY], plan[way + _SQUARE]
-    if square < 0.0:  # the fast decay first, then the slow one
-        return min(longest, _FIRST_STEP / (decay + math.sqrt(-square)) + _STEP_GROWTH * t)
-    return min(longest, _FIRST_STEP * tau)
+    if square < 0.0:  # the fast decay first, and once nothing of it is left the slow one
+        fast = decay + math.sqrt(-square)
+        rate = fast if fast * t < _DECAYED else 1.0 / (tau * tau * fast)
+        return min(longest, _FIRST_STEP / rate + _STEP_GROWTH * t)
+    # The error of a step of 8th order grows with the amplitude of the oscillation, which decays.
+    return min(longest, _FIRST_STEP * tau * math.exp(0.125 * decay * t))
