@@ -21,6 +21,8 @@ _MIN_NOISE = np.array([1e-4, 2e-4])
 _MAX_FITTED_FRAMES = 20_000
 _LOG_RATIO_BOUNDS = (-5.0, 45.0)
 _DIFFUSE = 1e12
+# Bandwidths: the least one [1/s], and the most as a share of the frame rate: the lag of a filter of three frames.
+_LEAST_BANDWIDTH, _MOST_PER_INTERVAL = 0.1, 3.4
 # Innovations before a coordinate has three frames depend on the diffuse initial state alone.
 _INITIAL_FRAMES = 3
 
@@ -69,6 +71,14 @@ class MotionFilter:
         heading = _most_likely([(t_s, np.ascontiguousarray(m[:, 2])) for t_s, m in kept])
         noise, jerk = np.array([position, heading]).T
         return cls(np.maximum(noise, _MIN_NOISE), jerk)
+
+    def bandwidth(self, interval_s: float) -> float:
+        """Return the bandwidth ω of the filter of positions [1/s] in steady state, at one frame every `interval_s`.
+
+        It is that of the same filter in continuous time (`agvbench.model.simulation.filtered_speed`).
+        """
+        bandwidth = (self.jerk[0] ** 2 / (self.noise[0] ** 2 * interval_s)) ** (1.0 / 6.0)
+        return float(np.clip(bandwidth, _LEAST_BANDWIDTH, _MOST_PER_INTERVAL / interval_s))
 
     def states(self, t_s: Floats, motion: Floats) -> MotionStates:
         """Return the states after each frame; `t_s` (n,) ascending, `motion` (n, 3) with continuous headings."""

@@ -183,6 +183,7 @@ def read_windows(
         np.array([w.yaw_rate for w in windows]).reshape(-1, 2),
         np.array([w.constant_velocity for w in windows]).reshape(-1, 3),
         np.array([w.noise for w in windows]).reshape(-1, 2),
+        np.array([w.bandwidth for w in windows]),
         np.array([recording_of(w.run) for w in windows], dtype=np.str_),
         np.array([w.run.session or "" for w in windows], dtype=np.str_),
     )

@@ -83,6 +83,7 @@ class InitialStates:
     yaw_rate: Floats
     constant_velocity: Floats
     noise: Floats
+    bandwidth: Floats
     recording: NDArray[np.str_]
     session: NDArray[np.str_]
 
@@ -111,6 +112,7 @@ class Window:
     yaw_rate: Floats
     constant_velocity: Floats
     noise: Floats
+    bandwidth: float
 
 
 def horizon_of(header: HeaderLike, runs: Iterable[Run]) -> Horizon | None:
@@ -178,6 +180,11 @@ class _Track:
     def near_s(self) -> float:
         """The largest distance in time of the frame that is taken for a sample [s]."""
         return max(_NEAR_S, _NEAR_INTERVALS * float(np.quantile(np.diff(self.t_s), _USUAL_INTERVALS)))
+
+    @cached_property
+    def bandwidth(self) -> float:
+        """The bandwidth of the motion filter of positions [1/s]."""
+        return self.recorded.filter.bandwidth(float(np.median(np.diff(self.t_s))))
 
     @cached_property
     def speed(self) -> Floats:
@@ -348,6 +355,7 @@ def _window(run: Run, horizon: Horizon, track: _Track, last: int) -> Window | No
         track.yaw_rate[last],
         _constant_velocity(t[recent], track.motion[recent]),
         track.recorded.filter.noise,
+        track.bandwidth,
     )
 
 

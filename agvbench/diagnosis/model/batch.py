@@ -31,6 +31,7 @@ class Batch:
     """
 
     has_heavy_tails: bool = False
+    speed_deviation: float = np.inf
 
     def __init__(
         self,
@@ -98,7 +99,9 @@ class Batch:
         readings = self.readings if readings is None else readings
         readings = readings if preset is None else replace(readings, preset=preset)
         kinds, level = self.kinds if kinds is None else kinds, self.nodal_deviation
-        return Batch(readings, self.maps, self.geometry, level, self.autocorrelation_time, kinds)
+        other = Batch(readings, self.maps, self.geometry, level, self.autocorrelation_time, kinds)
+        other.speed_deviation = self.speed_deviation
+        return other
 
     def with_priors(self, priors: tuple[Prior, ...]) -> Batch:
         """Return this batch with other priors of the effects' parameters; both share the packed runs."""

@@ -14,6 +14,16 @@ from agvbench.diagnosis.model.physical_priors import PhysicalPriors
 from agvbench.diagnosis.model.repeats import Repeats
 from agvbench.diagnosis.model.smoothness import PriorTerms
 from agvbench.effects.base import Stage
+from agvbench.model.simulation.layout import (
+    BANDWIDTH,
+    INITIAL_SIZE,
+    INITIAL_SPEED,
+    INITIAL_YAW_RATE,
+    RECENT_SPEED,
+    SPEED_DEVIATION,
+    SPEED_STDERR,
+    YAW_RATE_WEIGHT,
+)
 from agvbench.types import Floats
 
 
@@ -124,7 +134,7 @@ class Predictor:
         return np.zeros((len(self.readings), len(self.random_effects)))
 
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Return steady-state angles and speed of every row (rows, 3), and initial states (R, 7)."""
+        """Return steady-state angles and speed of every row (rows, 3), and initial states (R, 10)."""
         return self._inputs(parameters, self.no_random_effects())
 
     def all_parameters(self, parameters: Floats) -> Floats:
@@ -137,7 +147,7 @@ class Predictor:
         return values
 
     def _inputs(self, parameters: Floats, random_effects: Floats) -> tuple[Floats, Floats]:
-        """Return steady-state values of every row (rows, 3) and initial states (R, 7)."""
+        """Return steady-state values of every row (rows, 3) and initial states (R, 10)."""
         where, run = self.maps.slices(), self.batch.base.row_runs
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
         if random_effects.shape[1] > _OF_START:
@@ -146,13 +156,16 @@ class Predictor:
         front, rear = (np.clip(value, *self.steering_limits) for value in values[:2])
         front = np.where(self.batch.acting["front"], front, 0.0)
         speed = np.where(self.batch.acting["drive"], values[2], 0.0)
-        initial = np.zeros((len(self.readings), 7))
+        initial = np.zeros((len(self.readings), INITIAL_SIZE))
         initial[:, :3] = self.readings.start + random_effects[:, :_OF_START]
+        initial[:, BANDWIDTH] = np.inf
         if self.readings.initial_states is not None:
-            initial[:, 3] = self.readings.initial_states.speed_mps
-            initial[:, 4] = self.readings.initial_states.recent_speed_mps
+            states = self.readings.initial_states
+            initial[:, INITIAL_SPEED], initial[:, RECENT_SPEED] = states.speed_mps, states.recent_speed_mps
             if not self.readings.preset:
-                initial[:, 5:] = self.readings.initial_states.yaw_rate
+                initial[:, [INITIAL_YAW_RATE, YAW_RATE_WEIGHT]] = states.yaw_rate
+            initial[:, BANDWIDTH], initial[:, SPEED_STDERR] = states.bandwidth, states.speed_stderr
+            initial[:, SPEED_DEVIATION] = self.batch.speed_deviation
         return np.column_stack([front, rear, speed]), initial
 
     def predict(self, parameters: Floats, random_effects: Floats | None = None) -> Floats:

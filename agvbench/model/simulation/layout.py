@@ -25,3 +25,15 @@ START_ROLLED, START_SIZE = 7, 8
 # deviation of the drive's level, and whether it is differential.
 FRONT_AXLE, REAR_AXLE, FRONT_DRIVE_SHARE, LONGEST_STEP, STARTED, NODAL_DEVIATION, DIFFERENTIAL = range(7)
 SECONDS_PER_HOUR = 3600.0
+
+# How a run begins, after its pose: see `Simulation.predict`.
+(
+    INITIAL_SPEED,
+    RECENT_SPEED,
+    INITIAL_YAW_RATE,
+    YAW_RATE_WEIGHT,
+    BANDWIDTH,
+    SPEED_STDERR,
+    SPEED_DEVIATION,
+    INITIAL_SIZE,
+) = range(3, 11)

@@ -43,10 +43,33 @@ from agvbench.effects.state import (
 from agvbench.model.compiled import compiled
 from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
 from agvbench.model.simulation.commands import next_drive, obey, reset_memory
+from agvbench.model.simulation.filtered_speed import (
+    FILTER_SIZE,
+    between,
+    filter_speed,
+    missed_distance,
+    missed_speed,
+    reset_filter,
+)
 from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
 from agvbench.model.simulation.gaps import TOGETHER
-from agvbench.model.simulation.layout import COUNT, LONGEST_STEP, START_ROLLED, START_SIZE, STARTED, TURN, WORK_SIZE
-from agvbench.model.simulation.level import drive_speed, front_correction, level_lift, limit_body, see_late
+from agvbench.model.simulation.layout import (
+    BANDWIDTH,
+    COUNT,
+    INITIAL_SPEED,
+    INITIAL_YAW_RATE,
+    LONGEST_STEP,
+    RECENT_SPEED,
+    SPEED_DEVIATION,
+    SPEED_STDERR,
+    START_ROLLED,
+    START_SIZE,
+    STARTED,
+    TURN,
+    WORK_SIZE,
+    YAW_RATE_WEIGHT,
+)
+from agvbench.model.simulation.level import drive_speed, front_correction, level_lift, limit_body, move_ahead, see_late
 from agvbench.model.simulation.stages import adopt, arrive, capture
 from agvbench.model.simulation.step import end_step, take_step
 from agvbench.types import Floats
@@ -59,7 +82,6 @@ _FIRST_STEP_S, _TURN_PER_STEP = 0.08, 0.3
 _FASTEST_TURN = 150.0
 # Recent speed: averaged with weights that fall with this time constant [s].
 RECENT_SPEED_S = 0.5
-_STATE = 4
 
 
 @compiled(inner=True)
@@ -112,11 +134,22 @@ def _rest(s: Floats, servos: Floats) -> None:
 
 @compiled(inner=True)
 def _actuate_only(
-    s: Floats, p: Floats, plan: Floats, vehicle: Floats, servos: Floats, now: float, until: float
+    s: Floats,
+    p: Floats,
+    plan: Floats,
+    vehicle: Floats,
+    servos: Floats,
+    seen: Floats,
+    bandwidth: float,
+    now: float,
+    until: float,
+    begin: float,
 ) -> None:
     """Move the actuators from `now` to `until`, with the recent mean of the drive's speed and of its square."""
     limit_body(s, p, vehicle, now)
     plan_command(plan, s, servos)
+    if bandwidth < math.inf:
+        filter_speed(seen, plan, bandwidth, now, until, begin)
     leave_command(plan, until - now, servos)
     recent = -math.expm1((now - until) / RECENT_SPEED_S)
     servos[5] += (servos[4] - servos[5]) * recent
@@ -125,23 +158,19 @@ def _actuate_only(
 
 @compiled(inner=True)
 def _begin_in_motion(
-    s: Floats,
-    p: Floats,
-    vehicle: Floats,
-    servos: Floats,
-    now: float,
-    speed: float,
-    recent_speed: float,
-    yaw_rate: float,
-    weight: float,
+    s: Floats, p: Floats, vehicle: Floats, servos: Floats, seen: Floats, now: float, initial: Floats, start: Floats
 ) -> float:
-    """Put the measured speed and yaw rate into `servos`; return the lift of the drive level."""
-    lift = level_lift(s, p, vehicle, servos, now, recent_speed, speed)
-    servos[4] = drive_speed(s, p, vehicle, servos, now, speed)
+    """Put the measured speed and yaw rate into `servos`, and the pose into `start`; return the lift of the level."""
+    speed, weight = initial[INITIAL_SPEED], initial[YAW_RATE_WEIGHT]
+    lift = level_lift(s, p, vehicle, servos, now, initial[RECENT_SPEED], speed)
+    measured = drive_speed(s, p, vehicle, servos, now, speed) + missed_speed(seen, servos[4])
+    servos[4] = between(servos[4], measured, initial[SPEED_STDERR], initial[SPEED_DEVIATION])
+    if initial[BANDWIDTH] < math.inf:
+        move_ahead(s, p, vehicle, servos, now, missed_distance(seen, initial[BANDWIDTH]), start)
     if weight > 0.0:
-        s[FRONT], s[MEASURED_YAW_RATE], s[MEASURED_WEIGHT] = servos[2], yaw_rate, weight
+        s[FRONT], s[MEASURED_YAW_RATE], s[MEASURED_WEIGHT] = servos[2], initial[INITIAL_YAW_RATE], weight
         adopt(s, p)
-        turned = weight * front_correction(s, p, vehicle, servos, now, yaw_rate)
+        turned = weight * front_correction(s, p, vehicle, servos, now, initial[INITIAL_YAW_RATE])
         servos[0] += turned
         servos[2] += turned
     return float(lift)
@@ -155,10 +184,7 @@ def _drive_run(
     work: Floats,
     vehicle: Floats,
     begin: float,
-    speed: float,
-    recent_speed: float,
-    yaw_rate: float,
-    weight: float,
+    initial: Floats,
     commands: Floats,
     settled: Floats,
     command_t_s: Floats,
@@ -166,6 +192,7 @@ def _drive_run(
     last: int,
     start: Floats,
     servos: Floats,
+    seen: Floats,
     t_s: Floats,
     out: Floats,
     k: int,
@@ -173,6 +200,7 @@ def _drive_run(
 ) -> None:
     """Simulate one run, whose pose is held until `begin`; commands before that move the actuators only."""
     now, lift = -math.inf, 0.0
+    reset_filter(seen)
     reset_memory(s, commands, settled, first, start[2])
     driven = front = rear = first
     while now < math.inf:
@@ -186,12 +214,12 @@ def _drive_run(
             now = min(begin, end)
         elif now < begin:
             until = min(begin, end)
-            _actuate_only(s, p, plan, vehicle, servos, now, until)
+            _actuate_only(s, p, plan, vehicle, servos, seen, initial[BANDWIDTH], now, until, begin)
             now = until
         if now < end:
             if now == begin:
-                if not math.isnan(speed):
-                    lift = _begin_in_motion(s, p, vehicle, servos, now, speed, recent_speed, yaw_rate, weight)
+                if not math.isnan(initial[INITIAL_SPEED]):
+                    lift = _begin_in_motion(s, p, vehicle, servos, seen, now, initial, start)
                     obey(s, p, commands, settled, driven, front, rear, lift, now)
                 if s[SEEN_LAG] > 0.0:
                     see_late(s, p, vehicle, servos, now, start)
@@ -236,9 +264,7 @@ def simulate(
     p
         Every effect's parameters, then a number for each effect: 0 if all its parameters are at null.
     initial
-        (runs, 4): the measured initial pose, and the longitudinal speed (NaN: that of the earlier commands); or
-        (runs, 5) with the recent longitudinal speed, which determines the drive level; or (runs, 7) with the yaw rate,
-        which determines the front angle, and its weight beside that of the earlier commands.
+        (runs, 10): how each run begins; see `Simulation.predict`.
     begins_s
         (runs,): time stamp of the initial pose; NaN for runs that are at rest until their first command.
     started_h
@@ -257,7 +283,7 @@ def simulate(
         (frames, 3): receives x, y, heading.
     """
     s, plan, work = np.zeros(SIZE), np.zeros(PLAN_SIZE), np.zeros(WORK_SIZE)
-    servos, start = np.zeros(SERVOS_SIZE), np.zeros(START_SIZE)
+    servos, start, seen = np.zeros(SERVOS_SIZE), np.zeros(START_SIZE), np.zeros(FILTER_SIZE)
     s[KNOWN_FRONT] = s[KNOWN_REAR] = math.nan
     for run in chosen:
         k, stop = starts[run], starts[run + 1]
@@ -276,11 +302,8 @@ def simulate(
         if not math.isnan(begins_s[run]):
             begin = capture(s, begins_s[run], p)
         k = wait(s, p, start, begin, t_s, out, k, stop)
-        speed = initial[run, 3]
-        recent_speed = initial[run, 4] if initial.shape[1] > _STATE else speed
-        yaw_rate, weight = (initial[run, 5], initial[run, 6]) if initial.shape[1] > _STATE + 2 else (0.0, 0.0)
         if k < stop:
             _drive_run(
-                s, p, plan, work, vehicle, begin, speed, recent_speed, yaw_rate, weight, commands, settled,
-                command_t_s, first, last, start, servos, t_s, out, k, stop,
+                s, p, plan, work, vehicle, begin, initial[run], commands, settled, command_t_s, first, last, start,
+                servos, seen, t_s, out, k, stop,
             )  # fmt: skip

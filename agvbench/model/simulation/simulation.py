@@ -25,6 +25,7 @@ from agvbench.effects.state import LOGGED_COUNT
 from agvbench.errors import InputError, VehicleError
 from agvbench.model.simulation.compose import kernel
 from agvbench.model.simulation.hook_errors import check_hooks
+from agvbench.model.simulation.layout import BANDWIDTH, INITIAL_SIZE, INITIAL_SPEED, RECENT_SPEED
 from agvbench.model.simulation.threads import in_threads
 from agvbench.types import Command, Commands, Floats
 from agvbench.vehicle.geometry import Geometry
@@ -216,10 +217,13 @@ class Simulation:
         initial
             (runs, 4): the pose that the camera reports at the start (x, y, heading), and the longitudinal speed of the
             centroid (0 for a run from rest; NaN in a window: the speed that the commands before it result in). Effects
-            of the camera change the following poses, not the initial one. With a fifth column: the recent longitudinal
-            speed (averaged with weights that fall by e every 0.5 s), from which the drive's level is estimated. With a
-            sixth and a seventh column: the yaw rate [rad/s] with which a window begins, to which the front axle is
-            turned, and the share of this turn that is made (0: the angle remains that of the commands before it).
+            of the camera change the following poses, not the initial one. Up to (runs, 10), in the order of `layout`:
+            the recent longitudinal speed (averaged with weights that fall by e every 0.5 s), from which the drive's
+            level is estimated. The yaw rate [rad/s] with which a window begins, to which the front axle is turned, and
+            the share of this turn that is made (0: the angle remains that of the commands before it). The bandwidth
+            [1/s] of the motion filter that found pose and speed, whose lag is compensated (∞: it has none). The
+            standard error of the speed [m/s], and the usual deviation of measured speeds from those that commands
+            predict: where the error explains the difference, the predicted speed is taken (0, 0: never).
         runs
             Indices of the runs to simulate; all by default. Other runs' frames are left as they are in `out`.
         out
@@ -258,7 +262,7 @@ class Simulation:
         ]
         arguments = (
             np.append(parameters, np.logical_or.reduceat(parameters != self.nulls, self._first_parameters)),
-            np.ascontiguousarray(initial, dtype=np.float64),
+            _whole(initial),
             self.begins_s,
             self._started_h,
             self._logged,
@@ -291,6 +295,14 @@ class Simulation:
     def split(self, frames: Floats) -> list[Floats]:
         """Return an array over all frames as one per run."""
         return [frames[a:b] for a, b in pairwise(self.frame_starts.tolist())]
+
+
+def _whole(initial: Floats) -> Floats:
+    """Return how runs begin with every column of the layout, (runs, INITIAL_SIZE)."""
+    whole = np.zeros((len(initial), INITIAL_SIZE))
+    whole[:, RECENT_SPEED], whole[:, BANDWIDTH] = initial[:, INITIAL_SPEED], np.inf
+    whole[:, : initial.shape[1]] = initial
+    return whole
 
 
 def _logged(runs: Sequence[SimulatedRun]) -> Floats:
