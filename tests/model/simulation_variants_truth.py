@@ -209,6 +209,24 @@ def coasted(aim: Path, share: Path, moments: Floats, ramp_mps2: float, coast_s: 
     return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
 
 
+def held_back(aim: Path, share: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
+    """Return the path of a speed with a lag under power, whose body accelerates no more than a limit, from rest."""
+
+    def slope(_: float, v: Floats, aimed: float, most: float) -> Floats:
+        if aimed == 0.0:
+            return -v / values["coast_s"]
+        return np.asarray(np.clip((aimed - v) / values["powered_s"], -most, most))
+
+    pieces, v = [], np.zeros(1)
+    for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
+        given = float(aim(begin + 1e-9)), values["acceleration_mps2"] / share(begin + 1e-9)
+        found = solve_ivp(slope, (begin, until), v, args=given, dense_output=True, max_step=0.01, **_TIGHT)
+        pieces.append(found.sol)
+        v = found.y[:, -1]
+    begins = moments.tolist()
+    return lambda t: float(pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))[0])
+
+
 def sprung(aim: Path, share: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
     """Return the path of a speed that obeys a limited motor, and without power friction and a relaxing spring.
 
@@ -360,10 +378,11 @@ def true_form(name: str, values: dict[str, float], start: tuple[float, float, fl
         front, rear = (jumps_with_play(channel, values[f"{axle}_width_rad"]) for channel, axle in enumerate(AXLES))
     if name == "speed_lag_ramp":
         speed = ramped(speed, drives, values["acceleration_mps2"], values["braking_mps2"], end)
-    if name == "speed_lag_ramp_up":
-        speed = ramped_up(speed, share, drives, values["acceleration_mps2"], values["brake_s"], end)
-    if name == "speed_lag_coasting":
-        speed = coasted(speed, share, drives, values["acceleration_mps2"], values["coast_s"], end)
+    if name in ("speed_lag_ramp_up", "speed_lag_coasting"):
+        law = ramped_up if name == "speed_lag_ramp_up" else coasted
+        speed = law(speed, share, drives, *values.values(), end)
+    if name == "speed_lag_limited":
+        speed = held_back(speed, share, drives, values, end)
     if name == "speed_lag_friction":
         speed = rubbed(speed, drives, values, end)
     if name == "speed_lag_inertia":
