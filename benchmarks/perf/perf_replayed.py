@@ -12,7 +12,7 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,9 +26,10 @@ from agvbench.diagnosis.data.readings import read_windows
 from agvbench.diagnosis.data.windows import Horizon, RecordedMotion, recording_of
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.free_driving.method import static_maps
+from agvbench.diagnosis.result import Estimate
 from agvbench.effects import Effect, effect_kinds
 from agvbench.model import VehicleModel
-from agvbench.types import Run
+from agvbench.types import Commands, Floats, Run
 from agvbench.vehicle.maps import MonotoneTable
 
 MAX_WINDOWS = 300
@@ -64,8 +65,15 @@ PLANTED = (
     Planted(clock_s=0.12),
     Planted(speed=0.8),
 )
-SLOW = {"warthog": {"steering_lag": {"time_constant_s": 0.8}, "mocap_latency": {"latency_s": 0.5}}}
-"""Sizes for a vehicle whose poses come ten times a second."""
+OWN_SIZES: dict[str, dict[str, dict[str, float]]] = {
+    "warthog": {
+        "steering_lag": {"time_constant_s": 0.8},
+        "mocap_latency": {"latency_s": 0.5},
+        "lateral_slip": {"gradient": 2.0},
+        "marker_offset": {"forward_m": 0.15},
+    }
+}
+"""Sizes for a vehicle whose poses come ten times a second, that is five times as long, and that drives at 0.4 m/s."""
 OWN = {"warthog": (Planted(("turning_resistance", {"friction_radps": 0.1, "integral_time_s": 3.0})),)}
 """What is planted in the recordings of one vehicle beside what is planted in all."""
 
@@ -99,45 +107,87 @@ class Source:
         """Return the recordings, driven again with what was planted."""
         rng = np.random.default_rng([0x4E91, seed])
         last = max(str(run.session) for run in self.runs)
-        runs = []
+        recordings: dict[str, list[Run]] = {}
         for run in self.runs:
-            is_other = str(run.session) == last
+            recordings.setdefault(recording_of(run), []).append(run)
+        runs: list[Run] = []
+        for name, cut in recordings.items():
+            is_other = str(cut[0].session) == last
             model = self.model.with_effects(*planted.effects())
             if is_other and planted.speed != 1.0:
                 model = replace(model, drive=slower(model.drive, planted.speed))
-            frames = run.frames
-            t_s = np.maximum(frames.t_s - (planted.clock_s if is_other else 0.0), 0.0)
-            start = (frames.x_m[0], frames.y_m[0], frames.heading_rad[0])
-            poses = model.rollout([run.commands], [start], [t_s])[0]
-            position, heading = self.noise[recording_of(run)]
-            x, y, angle = (poses + rng.normal(size=poses.shape) * [position, position, heading]).T
-            runs.append(replace(run, frames=replace(frames, x_m=x, y_m=y, heading_rad=angle)))
+            position, heading = self.noise[name]
+            for run, poses in zip(cut, driven(model, cut, planted.clock_s * is_other), strict=True):
+                x, y, angle = (poses + rng.normal(size=poses.shape) * [position, position, heading]).T
+                runs.append(replace(run, frames=replace(run.frames, x_m=x, y_m=y, heading_rad=angle)))
         return Part(self.header, runs)
+
+
+def driven(model: VehicleModel, cut: list[Run], clock_s: float) -> list[Floats]:
+    """Return the poses (n, 3) of the frames of each run of a recording, which is driven without a stop.
+
+    An import cuts recordings into runs. Its vehicle is in motion where one ends and the next begins.
+    """
+    began_s = [run.started_s - cut[0].started_s for run in cut]
+    commands = [replace(run.commands, t_s=run.commands.t_s + t) for run, t in zip(cut, began_s, strict=True)]
+    whole = Commands(*(np.concatenate([getattr(c, f.name) for c in commands]) for f in fields(Commands)))
+    t_s = [np.maximum(run.frames.t_s + t - clock_s, 0.0) for run, t in zip(cut, began_s, strict=True)]
+    frames = cut[0].frames
+    start = (frames.x_m[0], frames.y_m[0], frames.heading_rad[0])
+    poses = model.rollout([whole], [start], [np.concatenate(t_s)])[0]
+    return np.split(poses, np.cumsum([len(t) for t in t_s])[:-1])
 
 
 def slower(drive: MonotoneTable, factor: float) -> MonotoneTable:
     return replace(drive, outputs=tuple(factor * value for value in drive.outputs))
 
 
-def judged(found: Diagnosis, planted: Planted) -> tuple[int, int, str]:
-    """Return how many names are right and wrong, and what was found in words."""
-    true = {planted.effect[0]} if planted.effect else set()
-    sessions = found.provenance["windows"]["sessions"]
-    right = wrong = 0
-    words = []
-    for effect in found.effects:
-        hit = bool(true & {effect.name, *effect.confounded_with})
-        right, wrong = right + hit, wrong + (not hit)
-        words.append(
-            f"{effect.name} {', '.join(f'{p.value:.3g} ± {p.stderr:.1g}' for p in effect.parameters.values())}"
-        )
-    for name, session in sessions.items():
-        for kind, size in (("clock_offset", planted.clock_s != 0.0), ("drive_level", planted.speed != 1.0)):
-            if session.get(kind, {}).get("significant"):
-                right, wrong = right + size, wrong + (not size)
-                value, stderr = list(session[kind].values())[:2]
-                words.append(f"{kind} of {name} {value:.3g} ± {stderr:.1g}")
-    return right, wrong, "; ".join(words) or "nothing"
+@dataclass(frozen=True)
+class Judged:
+    """Names that are ``right`` and ``wrong``, whether what was planted is ``sized`` right, and all in ``words``."""
+
+    right: int
+    wrong: int
+    sized: bool
+    words: str
+
+    @classmethod
+    def of(cls, found: Diagnosis, planted: Planted) -> Judged:
+        """Return the judgement of a diagnosis."""
+        true = {planted.effect[0]} if planted.effect else set()
+        right, wrong, sized, words = 0, 0, False, []
+        for effect in found.effects:
+            hit = bool(true & {effect.name, *effect.confounded_with})
+            right, wrong = right + hit, wrong + (not hit)
+            values = list(effect.parameters.values())
+            words.append(f"{effect.name} {', '.join(f'{p.value:.3g} ± {p.stderr:.1g} {p.unit}' for p in values)}")
+            if hit and planted.effect:
+                sized = "form" not in effect.evidence and all(map(is_sized, values, planted.effect[1].values()))
+        sessions = found.provenance["windows"]["sessions"]
+        for name, session in sessions.items():
+            for kind, size, is_planted in (
+                ("clock_offset", planted.clock_s, planted.clock_s != 0.0),
+                ("drive_level", planted.speed, planted.speed != 1.0),
+            ):
+                if session.get(kind, {}).get("significant"):
+                    right, wrong = right + is_planted, wrong + (not is_planted)
+                    value, stderr = list(session[kind].values())[:2]
+                    true_size = relative_size(kind, size, is_other=name == max(sessions))
+                    sized = sized or (is_planted and is_sized(Estimate(value, stderr, ""), true_size))
+                    words.append(f"{kind} of {name} {value:.3g} ± {stderr:.1g}")
+        return cls(right, wrong, sized, "; ".join(words) or "nothing")
+
+
+def relative_size(kind: str, size: float, *, is_other: bool) -> float:
+    """Return the size beside the other sessions, which of two sessions may be the last one."""
+    if is_other:
+        return size
+    return -size if kind == "clock_offset" else 1.0 / size
+
+
+def is_sized(found: Estimate, true: float) -> bool:
+    """Return whether an estimate is certain to half the size, and right to a fifth or to two standard errors."""
+    return found.stderr <= 0.5 * abs(true) and abs(found.value - true) <= max(0.2 * abs(true), 2.0 * found.stderr)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -149,25 +199,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--nothing", action="store_true", help="plant nothing: only controls")
     wanted = parser.parse_args(arguments)
     console = Console(width=None if sys.stdout.isatty() else 160)
-    count = {"nothing planted": 0, "a name there": 0, "planted": 0, "found": 0, "wrong names": 0}
+    count = {"nothing planted": 0, "a name there": 0, "planted": 0, "found": 0, "sized": 0, "wrong names": 0}
     for vehicle in wanted.vehicles:
         source = Source.of(vehicle)
         sessions = len({run.session for run in source.runs})
         for planted in (Planted(),) if wanted.nothing else (*PLANTED, *OWN.get(vehicle, ())):
             if (planted.clock_s or planted.speed != 1.0) and sessions < 2:
                 continue
-            if planted.effect and planted.effect[0] in SLOW.get(vehicle, {}):
-                planted = Planted((planted.effect[0], SLOW[vehicle][planted.effect[0]]))  # noqa: PLW2901
+            if planted.effect and planted.effect[0] in OWN_SIZES.get(vehicle, {}):
+                planted = Planted((planted.effect[0], OWN_SIZES[vehicle][planted.effect[0]]))  # noqa: PLW2901
             for seed in range(wanted.first_seed, wanted.first_seed + wanted.replays):
                 found = diagnose(source.replayed(planted, seed), seed=seed)
-                right, wrong, words = judged(found, planted)
+                judged = Judged.of(found, planted)
                 is_nothing = planted == Planted()
                 count["nothing planted"] += is_nothing
-                count["a name there"] += is_nothing and wrong > 0
+                count["a name there"] += is_nothing and judged.wrong > 0
                 count["planted"] += not is_nothing
-                count["found"] += right > 0
-                count["wrong names"] += wrong if not is_nothing else 0
-                console.print(f"{vehicle}, {planted}, seed {seed}: {found.verdict}: {words}", highlight=False)
+                count["found"] += judged.right > 0
+                count["sized"] += judged.sized
+                count["wrong names"] += 0 if is_nothing else judged.wrong
+                line = f"{vehicle}, {planted}, seed {seed}: {found.verdict}: {judged.words}"
+                console.print(f"{line}{'' if is_nothing or judged.sized else ' (not sized)'}", highlight=False)
     console.print(", ".join(f"{what}: {number}" for what, number in count.items()))
     return 0
 
