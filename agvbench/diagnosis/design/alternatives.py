@@ -58,14 +58,18 @@ def swapped(chosen: Fit, name: str, other: str, candidates: Mapping[str, Candida
     """Return the model with the effect `other` in the place of `name`, fitted from the best of its starts.
 
     Of `other` it has the library's equation. If that does not predict as well, it has the best of the equations that
-    the model simulates. None if the fits diverge from all starts.
+    the model simulates, by Akaike's criterion. None if the fits diverge from all starts.
     """
     found = _with_equation(chosen, name, candidates[other])
     if found is not None and found.total_loss < chosen.total_loss + SELECTION.alternative_margin:
         return found
     variants = [kind for kind in simulated_variants(chosen.predictor.batch) if kind.variant_of == other]
     fits = [found, *(_with_equation(chosen, name, candidate(kind)) for kind in variants)]
-    return min((own for own in fits if own is not None), key=lambda own: own.total_loss, default=None)
+    return min((own for own in fits if own is not None), key=_akaike, default=None)
+
+
+def _akaike(fitted: Fit) -> float:
+    return fitted.total_loss + 2.0 * len(fitted.parameters)
 
 
 def _with_equation(chosen: Fit, name: str, equation: Candidate) -> Fit | None:

@@ -13,6 +13,9 @@ from agvbench.diagnosis.model.nodal_maps import ROLES, NodalMaps
 from agvbench.model.simulation.simulation import SimulatedRun, Simulation
 from agvbench.types import Floats
 
+# Multiples of it modulo one are evenly spread and all different.
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+
 Integers = NDArray[np.int64]
 
 
@@ -78,7 +81,8 @@ class Perturbations:
     values that each of the R runs depends on, padded with others. ``heading`` (n,): whether the heading is perturbed.
     ``by_role``: the perturbations of each command. ``rows`` (r,) and ``row_change`` (r, 3): the row of each row of the
     copies, and the derivative of its commands. ``past`` (n,): whether only commands that ended before the window begins
-    are perturbed; ``past_change`` (rows, 3): the derivative of the commands of `base` by all of these at once.
+    are perturbed; ``past_change`` (rows, 3): the derivative of the commands of `base` by all of these at once, which
+    are of different sizes.
     """
 
     by_node: bool
@@ -121,9 +125,10 @@ class Perturbations:
         active = _active(rows_of_run, weights)
         rows, row_change = np.concatenate([rows_of_run[i] for i in run]), np.concatenate(changed)
         past = _past(base, index, rows, row_change) & (kinds != "heading")
+        # Of different sizes: a change of all speeds by the same is a change that a motion filter does not miss.
+        size = np.repeat(past * (1.0 + _GOLDEN * np.arange(len(run)) % 1.0), [len(rows_of_run[i]) for i in run])
         past_change = np.zeros((len(base.row_runs), len(ROLES)))
-        of_past = np.repeat(past, [len(rows_of_run[i]) for i in run])
-        np.add.at(past_change, rows[of_past], row_change[of_past])
+        np.add.at(past_change, rows, size[:, None] * row_change)
         return cls(
             by_node,
             index,
