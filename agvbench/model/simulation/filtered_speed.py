@@ -7,85 +7,78 @@ section 6.1)::
 
     p̂′ = v̂ + 2 ω e,   v̂′ = â + 2 ω² e,   â′ = ω³ e,   e = p − p̂
 
-It is simulated with the drive's speed at evenly spaced times, between which the speed is taken for linear.
+It is simulated in steps within which the drive's speed is taken for linear. No step reaches over a command, at which a
+drive without a lag jumps to another speed.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-from scipy.linalg import expm
-
 from agvbench.model.compiled import compiled
 from agvbench.model.simulation.actuators import speed_at
 from agvbench.model.simulation.gaps import TOGETHER
 from agvbench.types import Floats
 
-# Number of intervals, and their length in time constants 1 / ω of the filter.
-_COUNT, _LENGTH = 10, 0.8
-# Index of the next time, speed at the last one, then the filter: ω e, v̂ and â / ω.
-_NEXT, _LAST, _ERROR, _FOUND, _RATE, FILTER_SIZE = range(6)
-_UNDER_SPEED = np.array([[-2.0, -1.0, 0.0], [2.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-
-
-def _transition() -> Floats:
-    """Return (3, 5): how the filter's state and the speeds at both ends of an interval act on the state at its end."""
-    of_speed = np.zeros((5, 5))
-    of_speed[:3, :3] = _UNDER_SPEED
-    of_speed[0, 3] = 1.0  # the speed at the beginning
-    of_speed[3, 4] = 1.0 / _LENGTH  # its change over the interval
-    whole = expm(_LENGTH * of_speed)[:3]
-    whole[:, 3] -= whole[:, 4]
-    return np.ascontiguousarray(whole)
-
-
-_TRANSITION = _transition()
+# How long before a window it is simulated, and its longest step, in time constants 1 / ω of the filter.
+_BEFORE, _LONGEST = 8.0, 0.8
+# The state of the filter: ω e, v̂ and â / ω.
+_ERROR, _FOUND, _RATE, FILTER_SIZE = range(4)
+# Terms of the Taylor series of a step: the next one is below 1e-4 of the state.
+_TERMS = 6
 
 
 @compiled(inner=True)
 def reset_filter(seen: Floats) -> None:
     """Let the filter have found nothing yet."""
-    seen[:] = 0.0
-    seen[_LAST] = math.nan
+    seen[_ERROR], seen[_FOUND], seen[_RATE] = 0.0, math.nan, 0.0
 
 
 @compiled(inner=True)
 def filter_speed(seen: Floats, plan: Floats, bandwidth: float, now: float, until: float, begin: float) -> None:
     """Move the filter from `now` to `until`, with the speed of the command in force; the window begins at `begin`."""
-    interval = _LENGTH / bandwidth
-    at = begin - (_COUNT - seen[_NEXT]) * interval
-    while at <= until + TOGETHER and seen[_NEXT] <= _COUNT:
-        if at >= now:
-            speed = speed_at(plan, at - now)
-            if math.isnan(seen[_LAST]):
-                seen[_FOUND] = speed
-            else:
-                _advance(seen, speed)
-            seen[_LAST] = speed
-        seen[_NEXT] += 1.0
-        at = begin - (_COUNT - seen[_NEXT]) * interval
+    at = max(now, begin - _BEFORE / bandwidth)
+    if until - at <= TOGETHER:
+        return
+    speed = speed_at(plan, at - now)
+    if math.isnan(seen[_FOUND]):
+        seen[_FOUND] = speed
+    while until - at > TOGETHER:
+        length = min(until - at, _LONGEST / bandwidth)
+        at += length
+        last, speed = speed, speed_at(plan, at - now)
+        _advance(seen, bandwidth * length, last, speed)
 
 
 @compiled(inner=True)
-def _advance(seen: Floats, speed: float) -> None:
-    """Move the filter over one interval, at whose end the drive has this speed."""
-    before, error, found, rate = seen[_LAST], seen[_ERROR], seen[_FOUND], seen[_RATE]
-    for k in range(3):
-        row = _TRANSITION[k]
-        seen[_ERROR + k] = row[0] * error + row[1] * found + row[2] * rate + row[3] * before + row[4] * speed
+def _advance(seen: Floats, length: float, before: float, after: float) -> None:
+    """Move the filter over a step of a `length` in time constants, with the drive's speed `before` it and `after`."""
+    error, found, rate = seen[_ERROR], seen[_FOUND], seen[_RATE]
+    error, found, rate = before - found - 2.0 * error, 2.0 * error + rate, error
+    power = length
+    seen[_ERROR] += power * error
+    seen[_FOUND] += power * found
+    seen[_RATE] += power * rate
+    change = (after - before) / length
+    for k in range(2, _TERMS + 1):
+        error, found, rate = change - found - 2.0 * error, 2.0 * error + rate, error
+        change = 0.0
+        power *= length / k
+        seen[_ERROR] += power * error
+        seen[_FOUND] += power * found
+        seen[_RATE] += power * rate
 
 
 @compiled(inner=True)
 def missed_speed(seen: Floats, speed: float) -> float:
     """Return by how much the drive, at this speed, is faster than the filter found; 0 if it has found nothing."""
-    return 0.0 if math.isnan(seen[_LAST]) else speed - seen[_FOUND]
+    return 0.0 if math.isnan(seen[_FOUND]) else speed - seen[_FOUND]
 
 
 @compiled(inner=True)
 def missed_distance(seen: Floats, bandwidth: float) -> float:
     """Return by how much the drive is ahead of where the filter found it [m]; 0 if it has found nothing."""
-    return 0.0 if math.isnan(seen[_LAST]) else seen[_ERROR] / bandwidth
+    return 0.0 if math.isnan(seen[_FOUND]) else seen[_ERROR] / bandwidth
 
 
 @compiled(inner=True)
