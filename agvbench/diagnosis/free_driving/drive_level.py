@@ -28,7 +28,6 @@ from agvbench.types import Commands, Floats
 
 _SHORT_S = 0.01
 _SLOW_MPS = 0.05
-_MANY_ERRORS = 5.0
 _MOST_KNOTS, _WINDOWS_PER_KNOT, _ROUNDS = 15, 8, 5
 _LEAST_OVERLAP = 0.02
 """Less of a session's windows beside commands of other sessions says nothing about its level."""
@@ -47,17 +46,6 @@ def nodal_deviation(predictor: Predictor, parameters: Floats) -> float:
         deviation[session == name] -= np.median(deviation[session == name])
     least = FREE_DRIVING_LEVEL.min_deviation
     return max(least, 2.0 * robust_std(deviation)) if len(deviation) else least
-
-
-def speed_deviation(predictor: Predictor, parameters: Floats) -> float:
-    """Return the usual deviation [m/s] of measured initial speeds from predicted ones, beyond their standard error.
-
-    It is ∞ if it is many times the standard error: predicted speeds then say nothing.
-    """
-    states = _initial_states(predictor.readings)
-    scatter = robust_std(states.speed_mps - _predicted_speeds(predictor, parameters))
-    stderr = float(np.median(states.speed_stderr))
-    return float(np.sqrt(max(scatter**2 - stderr**2, 0.0))) if scatter < _MANY_ERRORS * stderr else np.inf
 
 
 @dataclass(frozen=True)
@@ -210,8 +198,8 @@ def _is_held(commands: Commands, begin_s: float, end_s: float) -> bool:
     return bool(np.ptp(commands.drive[max(int(first), 0) : max(int(last), 0) + 1]) == 0.0)
 
 
-def _predicted_speeds(predictor: Predictor, parameters: Floats) -> Floats:
-    """Return the longitudinal speed with which windows begin by the commands before them (W,) [m/s]."""
+def _speed_deviations(predictor: Predictor, parameters: Floats) -> Floats:
+    """Return the logarithm of the initial speed over the predicted one, (W,); NaN at low speed."""
     initial_states, batch = _initial_states(predictor.readings), predictor.batch
     short_runs = [
         replace(run, t_s=np.array([begins_s + _SHORT_S]))
@@ -221,12 +209,7 @@ def _predicted_speeds(predictor: Predictor, parameters: Floats) -> Floats:
     initial[:, 3] = np.nan
     simulation = Simulation(batch.geometry, batch.maps.neutral, short_runs, kinds=batch.kinds)
     moved = simulation.predict(settled, predictor.all_parameters(parameters), initial) - initial[:, :3]
-    return np.asarray((np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORT_S)
-
-
-def _speed_deviations(predictor: Predictor, parameters: Floats) -> Floats:
-    """Return the logarithm of the initial speed over the predicted one, (W,); NaN at low speed."""
-    initial_states, predicted = _initial_states(predictor.readings), _predicted_speeds(predictor, parameters)
+    predicted = (np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORT_S
     use = (
         (np.abs(predicted) > _SLOW_MPS)
         & (predicted * initial_states.speed_mps > 0.0)

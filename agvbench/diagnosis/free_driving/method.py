@@ -22,7 +22,7 @@ from agvbench.diagnosis.design.propose import with_next_experiment
 from agvbench.diagnosis.estimation.fit import Fit, fit
 from agvbench.diagnosis.free_driving.conclusion import WindowConclusion
 from agvbench.diagnosis.free_driving.describing_term import SelectionWithTerm, with_describing_term
-from agvbench.diagnosis.free_driving.drive_level import DriveLevel, drive_levels, nodal_deviation, speed_deviation
+from agvbench.diagnosis.free_driving.drive_level import DriveLevel, drive_levels, nodal_deviation
 from agvbench.diagnosis.free_driving.lag_or_variation import without_mimicking_lags
 from agvbench.diagnosis.free_driving.maps import NODES, smooth_maps, start_values_of_windows
 from agvbench.diagnosis.free_driving.predictors import autocorrelation_time
@@ -183,16 +183,14 @@ class FreeDriving(Method[SelectedFromWindows]):
             Predictor(Batch(fitted, maps, context.geometry, deviation)), static.parameters, np.empty((0, 2))
         )
         redundancy = autocorrelation_time(fitted_maps)
-        batch = Batch(fitted, maps, context.geometry, deviation, redundancy, kinds)
-        batch.speed_deviation = speed_deviation(static.predictor, static.parameters)
         return WindowSelector(
-            batch,
+            Batch(fitted, maps, context.geometry, deviation, redundancy, kinds),
             tried,
             fitted_maps.parameters,
             context.seed,
             self.on_progress,
             *given,
-            test_batch=batch.repacked(test),
+            test_batch=Batch(test, maps, context.geometry, deviation, kinds=kinds),
         )
 
 

@@ -123,7 +123,8 @@ def select_drive(selection: Selection, selector: WindowSelector) -> tuple[Select
         drives = (kind.name for kind in simulated_variants(extended.batch) if kind.name in DRIVES)
         tried = (extended.with_effect(chosen, name) for name in drives)
         better = [model for model in tried if model.is_fitted and extended.improves(chosen, model)]
-        chosen = extended.preferred(better) if better else chosen
+        # One equation may contain another, and predict the same with a parameter more.
+        chosen = min(better, key=lambda model: model.deviance + 2.0 * len(model.fit.parameters), default=chosen)
     if {*chosen.names} == {*selection.chosen.names}:
         return selection, selector
     add_variants(extended, chosen.names)

@@ -31,7 +31,6 @@ class Batch:
     """
 
     has_heavy_tails: bool = False
-    speed_deviation: float = np.inf
 
     def __init__(
         self,
@@ -99,9 +98,7 @@ class Batch:
         readings = self.readings if readings is None else readings
         readings = readings if preset is None else replace(readings, preset=preset)
         kinds, level = self.kinds if kinds is None else kinds, self.nodal_deviation
-        other = Batch(readings, self.maps, self.geometry, level, self.autocorrelation_time, kinds)
-        other.speed_deviation = self.speed_deviation
-        return other
+        return Batch(readings, self.maps, self.geometry, level, self.autocorrelation_time, kinds)
 
     def with_priors(self, priors: tuple[Prior, ...]) -> Batch:
         """Return this batch with other priors of the effects' parameters; both share the packed runs."""

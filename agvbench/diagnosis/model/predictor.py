@@ -20,8 +20,6 @@ from agvbench.model.simulation.layout import (
     INITIAL_SPEED,
     INITIAL_YAW_RATE,
     RECENT_SPEED,
-    SPEED_DEVIATION,
-    SPEED_STDERR,
     YAW_RATE_WEIGHT,
 )
 from agvbench.types import Floats
@@ -134,7 +132,7 @@ class Predictor:
         return np.zeros((len(self.readings), len(self.random_effects)))
 
     def settled(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Return steady-state angles and speed of every row (rows, 3), and initial states (R, 10)."""
+        """Return steady-state angles and speed of every row (rows, 3), and initial states (R, 8)."""
         return self._inputs(parameters, self.no_random_effects())
 
     def all_parameters(self, parameters: Floats) -> Floats:
@@ -147,7 +145,7 @@ class Predictor:
         return values
 
     def _inputs(self, parameters: Floats, random_effects: Floats) -> tuple[Floats, Floats]:
-        """Return steady-state values of every row (rows, 3) and initial states (R, 10)."""
+        """Return steady-state values of every row (rows, 3) and initial states (R, 8)."""
         where, run = self.maps.slices(), self.batch.base.row_runs
         values = [self.batch.weights[role] @ parameters[where[role]] for role in ROLES]
         if random_effects.shape[1] > _OF_START:
@@ -164,8 +162,7 @@ class Predictor:
             initial[:, INITIAL_SPEED], initial[:, RECENT_SPEED] = states.speed_mps, states.recent_speed_mps
             if not self.readings.preset:
                 initial[:, [INITIAL_YAW_RATE, YAW_RATE_WEIGHT]] = states.yaw_rate
-            initial[:, BANDWIDTH], initial[:, SPEED_STDERR] = states.bandwidth, states.speed_stderr
-            initial[:, SPEED_DEVIATION] = self.batch.speed_deviation
+            initial[:, BANDWIDTH] = states.bandwidth
         return np.column_stack([front, rear, speed]), initial
 
     def predict(self, parameters: Floats, random_effects: Floats | None = None) -> Floats:

@@ -79,16 +79,3 @@ def missed_speed(seen: Floats, speed: float) -> float:
 def missed_distance(seen: Floats, bandwidth: float) -> float:
     """Return by how much the drive is ahead of where the filter found it [m]; 0 if it has found nothing."""
     return 0.0 if math.isnan(seen[_FOUND]) else seen[_ERROR] / bandwidth
-
-
-@compiled(inner=True)
-def between(predicted: float, measured: float, stderr: float, deviation: float) -> float:
-    """Return the speed between a predicted and a measured one, by the standard error of the measured one.
-
-    `deviation` is the usual one of measured speeds from those that commands predict, beyond their standard error. Where
-    it is small, a difference that the error explains is left to the prediction; a larger one is measured. The result is
-    less than one standard error from the measured speed.
-    """
-    difference = measured - predicted
-    known = difference * difference + deviation * deviation
-    return predicted + (difference / (1.0 + 4.0 * stderr * stderr / known) if known > 0.0 else 0.0)

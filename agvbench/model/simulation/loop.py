@@ -45,7 +45,6 @@ from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_co
 from agvbench.model.simulation.commands import next_drive, obey, reset_memory
 from agvbench.model.simulation.filtered_speed import (
     FILTER_SIZE,
-    between,
     filter_speed,
     missed_distance,
     missed_speed,
@@ -60,8 +59,6 @@ from agvbench.model.simulation.layout import (
     INITIAL_YAW_RATE,
     LONGEST_STEP,
     RECENT_SPEED,
-    SPEED_DEVIATION,
-    SPEED_STDERR,
     START_ROLLED,
     START_SIZE,
     STARTED,
@@ -163,8 +160,7 @@ def _begin_in_motion(
     """Put the measured speed and yaw rate into `servos`, and the pose into `start`; return the lift of the level."""
     speed, weight = initial[INITIAL_SPEED], initial[YAW_RATE_WEIGHT]
     lift = level_lift(s, p, vehicle, servos, now, initial[RECENT_SPEED], speed)
-    measured = drive_speed(s, p, vehicle, servos, now, speed) + missed_speed(seen, servos[4])
-    servos[4] = between(servos[4], measured, initial[SPEED_STDERR], initial[SPEED_DEVIATION])
+    servos[4] = drive_speed(s, p, vehicle, servos, now, speed) + missed_speed(seen, servos[4])
     if initial[BANDWIDTH] < math.inf:
         move_ahead(s, p, vehicle, servos, now, missed_distance(seen, initial[BANDWIDTH]), start)
     if weight > 0.0:
@@ -264,7 +260,7 @@ def simulate(
     p
         Every effect's parameters, then a number for each effect: 0 if all its parameters are at null.
     initial
-        (runs, 10): how each run begins; see `Simulation.predict`.
+        (runs, 8): how each run begins; see `Simulation.predict`.
     begins_s
         (runs,): time stamp of the initial pose; NaN for runs that are at rest until their first command.
     started_h

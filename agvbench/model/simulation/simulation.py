@@ -217,13 +217,11 @@ class Simulation:
         initial
             (runs, 4): the pose that the camera reports at the start (x, y, heading), and the longitudinal speed of the
             centroid (0 for a run from rest; NaN in a window: the speed that the commands before it result in). Effects
-            of the camera change the following poses, not the initial one. Up to (runs, 10), in the order of `layout`:
+            of the camera change the following poses, not the initial one. Up to (runs, 8), in the order of `layout`:
             the recent longitudinal speed (averaged with weights that fall by e every 0.5 s), from which the drive's
             level is estimated. The yaw rate [rad/s] with which a window begins, to which the front axle is turned, and
             the share of this turn that is made (0: the angle remains that of the commands before it). The bandwidth
-            [1/s] of the motion filter that found pose and speed, whose lag is compensated (∞: it has none). The
-            standard error of the speed [m/s], and the usual deviation of measured speeds from those that commands
-            predict: where the error explains the difference, the predicted speed is taken (0, 0: never).
+            [1/s] of the motion filter that found pose and speed, whose lag is compensated (∞: it has none).
         runs
             Indices of the runs to simulate; all by default. Other runs' frames are left as they are in `out`.
         out
