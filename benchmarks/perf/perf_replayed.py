@@ -11,8 +11,9 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from rich.console import Console
 from agvbench.campaign import CampaignHeader, import_recordings
 from agvbench.diagnosis import Diagnosis, diagnose
 from agvbench.diagnosis.data.readings import read_windows
-from agvbench.diagnosis.data.windows import Horizon, RecordedMotion, recording_of
+from agvbench.diagnosis.data.windows import Horizon, RecordedMotion, by_recording
 from agvbench.diagnosis.findings.corrected_vehicle import corrected_vehicle
 from agvbench.diagnosis.free_driving.method import static_maps
 from agvbench.diagnosis.result import Estimate
@@ -99,19 +100,15 @@ class Source:
             windows.select(np.arange(0, len(windows), 1 + len(windows) // MAX_WINDOWS)), runs, geometry, header.neutral
         )
         model = corrected_vehicle(header, geometry, fitted, fitted.predictor.maps, 0)
-        names = {recording_of(run) for run in runs}
-        noise = {n: RecordedMotion.of([r for r in runs if recording_of(r) == n]).filter.noise for n in names}
+        noise = {name: RecordedMotion.of(cut).filter.noise for name, cut in by_recording(runs).items()}
         return cls(header, runs, model, noise)
 
     def replayed(self, planted: Planted, seed: int) -> Part:
         """Return the recordings, driven again with what was planted."""
         rng = np.random.default_rng([0x4E91, seed])
         last = max(str(run.session) for run in self.runs)
-        recordings: dict[str, list[Run]] = {}
-        for run in self.runs:
-            recordings.setdefault(recording_of(run), []).append(run)
         runs: list[Run] = []
-        for name, cut in recordings.items():
+        for name, cut in by_recording(self.runs).items():
             is_other = str(cut[0].session) == last
             model = self.model.with_effects(*planted.effects())
             if is_other and planted.speed != 1.0:
@@ -144,38 +141,37 @@ def slower(drive: MonotoneTable, factor: float) -> MonotoneTable:
 
 @dataclass(frozen=True)
 class Judged:
-    """Names that are ``right`` and ``wrong``, whether what was planted is ``sized`` right, and all in ``words``."""
+    """One thing that was found: whether its name is ``right``, and its size (``sized``), and both in ``words``."""
 
-    right: int
-    wrong: int
+    right: bool
     sized: bool
     words: str
 
-    @classmethod
-    def of(cls, found: Diagnosis, planted: Planted) -> Judged:
-        """Return the judgement of a diagnosis."""
-        true = {planted.effect[0]} if planted.effect else set()
-        right, wrong, sized, words = 0, 0, False, []
-        for effect in found.effects:
-            hit = bool(true & {effect.name, *effect.confounded_with})
-            right, wrong = right + hit, wrong + (not hit)
-            values = list(effect.parameters.values())
-            words.append(f"{effect.name} {', '.join(f'{p.value:.3g} ± {p.stderr:.1g} {p.unit}' for p in values)}")
-            if hit and planted.effect:
-                sized = "form" not in effect.evidence and all(map(is_sized, values, planted.effect[1].values()))
-        sessions = found.provenance["windows"]["sessions"]
-        for name, session in sessions.items():
-            for kind, size, is_planted in (
-                ("clock_offset", planted.clock_s, planted.clock_s != 0.0),
-                ("drive_level", planted.speed, planted.speed != 1.0),
-            ):
-                if session.get(kind, {}).get("significant"):
-                    right, wrong = right + is_planted, wrong + (not is_planted)
-                    value, stderr = list(session[kind].values())[:2]
-                    true_size = relative_size(kind, size, is_other=name == max(sessions))
-                    sized = sized or (is_planted and is_sized(Estimate(value, stderr, ""), true_size))
-                    words.append(f"{kind} of {name} {value:.3g} ± {stderr:.1g}")
-        return cls(right, wrong, sized, "; ".join(words) or "nothing")
+
+def judged(found: Diagnosis, planted: Planted) -> list[Judged]:
+    """Return what was found: effects, and offsets and levels of sessions."""
+    return [*_judged_effects(found, planted), *_judged_sessions(found, planted)]
+
+
+def _judged_effects(found: Diagnosis, planted: Planted) -> Iterator[Judged]:
+    name, true = planted.effect or ("", {})
+    for effect in found.effects:
+        right, values = name in {effect.name, *effect.confounded_with}, list(effect.parameters.values())
+        sized = right and "form" not in effect.evidence and all(map(is_sized, values, true.values()))
+        sizes = ", ".join(f"{p.value:.3g} ± {p.stderr:.1g} {p.unit}" for p in values)
+        yield Judged(right, sized, f"{effect.name} {sizes}")
+
+
+def _judged_sessions(found: Diagnosis, planted: Planted) -> Iterator[Judged]:
+    sessions = found.provenance["windows"]["sessions"]
+    planted_as = {"clock_offset": (planted.clock_s, 0.0), "drive_level": (planted.speed, 1.0)}
+    for (name, session), (kind, (true, null)) in product(sessions.items(), planted_as.items()):
+        if not session.get(kind, {}).get("significant"):
+            continue
+        value, stderr = list(session[kind].values())[:2]
+        right, size = true != null, relative_size(kind, true, is_other=name == max(sessions))
+        sized = right and is_sized(Estimate(value, stderr, ""), size)
+        yield Judged(right, sized, f"{kind} of {name} {value:.3g} ± {stderr:.1g}")
 
 
 def relative_size(kind: str, size: float, *, is_other: bool) -> float:
@@ -210,16 +206,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 planted = Planted((planted.effect[0], OWN_SIZES[vehicle][planted.effect[0]]))  # noqa: PLW2901
             for seed in range(wanted.first_seed, wanted.first_seed + wanted.replays):
                 found = diagnose(source.replayed(planted, seed), seed=seed)
-                judged = Judged.of(found, planted)
-                is_nothing = planted == Planted()
+                things, is_nothing = judged(found, planted), planted == Planted()
+                wrong, sized = sum(not one.right for one in things), any(one.sized for one in things)
                 count["nothing planted"] += is_nothing
-                count["a name there"] += is_nothing and judged.wrong > 0
+                count["a name there"] += is_nothing and wrong > 0
                 count["planted"] += not is_nothing
-                count["found"] += judged.right > 0
-                count["sized"] += judged.sized
-                count["wrong names"] += 0 if is_nothing else judged.wrong
-                line = f"{vehicle}, {planted}, seed {seed}: {found.verdict}: {judged.words}"
-                console.print(f"{line}{'' if is_nothing or judged.sized else ' (not sized)'}", highlight=False)
+                count["found"] += any(one.right for one in things)
+                count["sized"] += sized
+                count["wrong names"] += 0 if is_nothing else wrong
+                words = "; ".join(one.words for one in things) or "nothing"
+                line = f"{vehicle}, {planted}, seed {seed}: {found.verdict}: {words}"
+                console.print(f"{line}{'' if is_nothing or sized else ' (not sized)'}", highlight=False)
     console.print(", ".join(f"{what}: {number}" for what, number in count.items()))
     return 0
 

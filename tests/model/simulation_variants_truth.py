@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -26,6 +26,15 @@ def at_once(values: Floats, moments: Floats) -> Path:
     """Return the path of what jumps to `values` at `moments`; `values` begins with where it was before."""
     steps, levels = moments.tolist(), values.tolist()
     return lambda t: levels[bisect.bisect_right(steps, t)]
+
+
+def joined(begins: list[float], pieces: Sequence[Path]) -> Path:
+    """Return the path whose pieces begin at `begins`, and which stands before."""
+    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+
+
+def _first(solution: Any, t: float) -> float:
+    return float(solution(t)[0])
 
 
 def second_order(aim: Path, rest: float, moments: Floats, lag: float, tau: float, end: float) -> Path:
@@ -103,8 +112,7 @@ def taken_up(aim: Path, rest: float, moments: Floats, lags: Floats, end: float) 
         )
         pieces.append(piece)
         was = piece(until)
-    begins = moments.tolist()
-    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+    return joined(moments.tolist(), pieces)
 
 
 def _parabola(t: float, times: list[float], states: list[Floats], push: list[float]) -> float:
@@ -160,7 +168,7 @@ def ramped_up(aim: Path, share: Path, moments: Floats, speeding_mps2: float, bra
             pieces.append(piece)
             now = min(until, stops)
             v = (0.0 if falls else aimed) if now == stops else piece(now)
-    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+    return joined(begins, pieces)
 
 
 def rubbed(aim: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
@@ -185,7 +193,7 @@ def rubbed(aim: Path, moments: Floats, values: dict[str, float], end: float) -> 
             pieces.append(piece)
             now = min(until, stops)
             v = then if now == stops else piece(now)
-    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+    return joined(begins, pieces)
 
 
 def coasted(aim: Path, share: Path, moments: Floats, ramp_mps2: float, coast_s: float, end: float) -> Path:
@@ -205,8 +213,7 @@ def coasted(aim: Path, share: Path, moments: Floats, ramp_mps2: float, coast_s: 
             )  # fmt: skip
         pieces.append(piece)
         v = piece(until)
-    begins = moments.tolist()
-    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+    return joined(moments.tolist(), pieces)
 
 
 def held_back(aim: Path, share: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
@@ -221,10 +228,9 @@ def held_back(aim: Path, share: Path, moments: Floats, values: dict[str, float],
     for begin, until in zip(moments.tolist(), [*moments[1:].tolist(), end], strict=True):
         given = float(aim(begin + 1e-9)), values["acceleration_mps2"] / share(begin + 1e-9)
         found = solve_ivp(slope, (begin, until), v, args=given, dense_output=True, max_step=0.01, **_TIGHT)
-        pieces.append(found.sol)
+        pieces.append(partial(_first, found.sol))
         v = found.y[:, -1]
-    begins = moments.tolist()
-    return lambda t: float(pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))[0])
+    return joined(moments.tolist(), pieces)
 
 
 def sprung(aim: Path, share: Path, moments: Floats, values: dict[str, float], end: float) -> Path:
@@ -250,8 +256,7 @@ def sprung(aim: Path, share: Path, moments: Floats, values: dict[str, float], en
         piece = partial(_sprung_speed, found.sol, aimed, begin, state[0], limit, values.get("lag_s", 0.0))
         pieces.append(piece)
         state = np.array([piece(until), found.y[1, -1]])
-    begins = moments.tolist()
-    return lambda t: pieces[max(0, bisect.bisect_right(begins, t) - 1)](max(t, begins[0]))
+    return joined(moments.tolist(), pieces)
 
 
 def _sprung_speed(
@@ -287,12 +292,12 @@ def backlash_closes(moments: Floats, speeds: Floats, backlash_m: float) -> tuple
 
 
 def _pieces(equation: Any, aim: Path, state: Floats, moments: Floats, end: float) -> Path:
-    found = []
+    pieces = []
     for begin, until in zip(moments, [*moments[1:], end], strict=True):
-        found.append(solve_ivp(equation(aim(begin + 1e-9)), (begin, until), state, dense_output=True, **_TIGHT))
-        state = found[-1].y[:, -1]
-    steps = moments.tolist()
-    return lambda t: float(found[max(0, bisect.bisect_right(steps, t) - 1)].sol(max(t, steps[0]))[0])
+        found = solve_ivp(equation(aim(begin + 1e-9)), (begin, until), state, dense_output=True, **_TIGHT)
+        pieces.append(partial(_first, found.sol))
+        state = found.y[:, -1]
+    return joined(moments.tolist(), pieces)
 
 
 def drive(

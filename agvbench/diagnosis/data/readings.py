@@ -20,6 +20,7 @@ from agvbench.diagnosis.data.windows import (
     RecordedMotion,
     Window,
     blocks,
+    by_recording,
     cut_windows,
     recording_of,
 )
@@ -163,12 +164,8 @@ def read_windows(
     every = list(with_common_levels(list(runs)))
     began = session_starts(every)
     refused = {run.run_id: run.status for run in every if not run.is_ok}
-    usable: dict[str, list[Run]] = {}
-    for run in every:
-        if run.is_ok:
-            usable.setdefault(recording_of(run), []).append(run)
     windows: list[Window] = []
-    for recording in usable.values():
+    for recording in by_recording(run for run in every if run.is_ok).values():
         recorded = RecordedMotion.of(recording)
         for run in recording:
             try:

@@ -73,7 +73,8 @@ class InitialStates:
     its standard error. ``recent_speed_mps``: its weighted mean over the recent past. ``yaw_rate`` (W, 2): yaw rate
     [rad/s], and its weight beside that of the commands before the window. ``constant_velocity`` (W, 3):
     longitudinal and lateral velocity [m/s] and yaw rate [rad/s] over the last `CONSTANT_VELOCITY_S`. ``noise`` (W, 2):
-    standard deviation of one frame in position [m] and heading [rad]. ``recording`` and ``session``: names.
+    standard deviation of one frame in position [m] and heading [rad]. ``bandwidth`` [1/s]: that of the motion filter of
+    positions. ``recording`` and ``session``: names.
     """
 
     t_s: Floats
@@ -371,6 +372,14 @@ def _commands_between(run: Run, t0: float, begin_s: float, end_s: float) -> Comm
     if first or not np.any(run.frames.t_s < -_NEAR_S):
         t_s[0] = min(t_s[0], t0) - _HELD_S
     return Commands(t_s, c.drive[first:stop], c.front[first:stop], c.rear[first:stop])
+
+
+def by_recording(runs: Iterable[Run]) -> dict[str, list[Run]]:
+    """Return the runs of each recording, by its name."""
+    found: dict[str, list[Run]] = {}
+    for run in runs:
+        found.setdefault(recording_of(run), []).append(run)
+    return found
 
 
 def recording_of(run: Run) -> str:

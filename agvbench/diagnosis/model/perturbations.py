@@ -125,7 +125,7 @@ class Perturbations:
         active = _active(rows_of_run, weights)
         rows, row_change = np.concatenate([rows_of_run[i] for i in run]), np.concatenate(changed)
         past = _past(base, index, rows, row_change) & (kinds != "heading")
-        # Of different sizes: a change of all speeds by the same is a change that a motion filter does not miss.
+        # Of different sizes: a common change of all speeds would leave the error of a motion filter as it is.
         size = np.repeat(past * (1.0 + _GOLDEN * np.arange(len(run)) % 1.0), [len(rows_of_run[i]) for i in run])
         past_change = np.zeros((len(base.row_runs), len(ROLES)))
         np.add.at(past_change, rows, size[:, None] * row_change)

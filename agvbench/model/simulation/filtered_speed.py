@@ -29,53 +29,53 @@ _TERMS = 6
 
 
 @compiled(inner=True)
-def reset_filter(seen: Floats) -> None:
+def reset_filter(filtered: Floats) -> None:
     """Let the filter have found nothing yet."""
-    seen[_ERROR], seen[_FOUND], seen[_RATE] = 0.0, math.nan, 0.0
+    filtered[_ERROR], filtered[_FOUND], filtered[_RATE] = 0.0, math.nan, 0.0
 
 
 @compiled(inner=True)
-def filter_speed(seen: Floats, plan: Floats, bandwidth: float, now: float, until: float, begin: float) -> None:
+def filter_speed(filtered: Floats, plan: Floats, bandwidth: float, now: float, until: float, begin: float) -> None:
     """Move the filter from `now` to `until`, with the speed of the command in force; the window begins at `begin`."""
     at = max(now, begin - _BEFORE / bandwidth)
     if until - at <= TOGETHER:
         return
     speed = speed_at(plan, at - now)
-    if math.isnan(seen[_FOUND]):
-        seen[_FOUND] = speed
+    if math.isnan(filtered[_FOUND]):
+        filtered[_FOUND] = speed
     while until - at > TOGETHER:
         length = min(until - at, _LONGEST / bandwidth)
         at += length
         last, speed = speed, speed_at(plan, at - now)
-        _advance(seen, bandwidth * length, last, speed)
+        _advance(filtered, bandwidth * length, last, speed)
 
 
 @compiled(inner=True)
-def _advance(seen: Floats, length: float, before: float, after: float) -> None:
+def _advance(filtered: Floats, length: float, before: float, after: float) -> None:
     """Move the filter over a step of a `length` in time constants, with the drive's speed `before` it and `after`."""
-    error, found, rate = seen[_ERROR], seen[_FOUND], seen[_RATE]
+    error, found, rate = filtered[_ERROR], filtered[_FOUND], filtered[_RATE]
     error, found, rate = before - found - 2.0 * error, 2.0 * error + rate, error
     power = length
-    seen[_ERROR] += power * error
-    seen[_FOUND] += power * found
-    seen[_RATE] += power * rate
+    filtered[_ERROR] += power * error
+    filtered[_FOUND] += power * found
+    filtered[_RATE] += power * rate
     change = (after - before) / length
     for k in range(2, _TERMS + 1):
         error, found, rate = change - found - 2.0 * error, 2.0 * error + rate, error
         change = 0.0
         power *= length / k
-        seen[_ERROR] += power * error
-        seen[_FOUND] += power * found
-        seen[_RATE] += power * rate
+        filtered[_ERROR] += power * error
+        filtered[_FOUND] += power * found
+        filtered[_RATE] += power * rate
 
 
 @compiled(inner=True)
-def missed_speed(seen: Floats, speed: float) -> float:
+def speed_error(filtered: Floats, speed: float) -> float:
     """Return by how much the drive, at this speed, is faster than the filter found; 0 if it has found nothing."""
-    return 0.0 if math.isnan(seen[_FOUND]) else speed - seen[_FOUND]
+    return 0.0 if math.isnan(filtered[_FOUND]) else speed - filtered[_FOUND]
 
 
 @compiled(inner=True)
-def missed_distance(seen: Floats, bandwidth: float) -> float:
+def position_error(filtered: Floats, bandwidth: float) -> float:
     """Return by how much the drive is ahead of where the filter found it [m]; 0 if it has found nothing."""
-    return 0.0 if math.isnan(seen[_FOUND]) else seen[_ERROR] / bandwidth
+    return 0.0 if math.isnan(filtered[_FOUND]) else filtered[_ERROR] / bandwidth

@@ -127,21 +127,25 @@ def level_lift(
 
 
 @compiled(inner=True)
+def _displace(s: Floats, duration: float, start: Floats) -> None:
+    """Displace the start by the body's velocity over a `duration`."""
+    cosine, sine = math.cos(start[2]), math.sin(start[2])
+    start[0] += duration * (cosine * s[FORWARD] - sine * s[LEFT])
+    start[1] += duration * (sine * s[FORWARD] + cosine * s[LEFT])
+
+
+@compiled(inner=True)
 def move_ahead(
     s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, distance: float, start: Floats
 ) -> None:
     """Move the start ahead by a `distance` of the drive."""
     _longitudinal_speed(s, p, vehicle, servos, now, 1.0)
-    cosine, sine = math.cos(start[2]), math.sin(start[2])
-    start[0] += distance * (cosine * s[FORWARD] - sine * s[LEFT])
-    start[1] += distance * (sine * s[FORWARD] + cosine * s[LEFT])
+    _displace(s, distance, start)
 
 
 @compiled(inner=True)
 def see_late(s: Floats, p: Floats, vehicle: Floats, servos: Floats, now: float, start: Floats) -> None:
     """Move the start ahead of the pose that a smoothing camera reports, by its delay in steady motion."""
     _longitudinal_speed(s, p, vehicle, servos, now, servos[4])
-    cosine, sine, lag = math.cos(start[2]), math.sin(start[2]), s[SEEN_LAG]
-    start[0] += lag * (cosine * s[FORWARD] - sine * s[LEFT])
-    start[1] += lag * (sine * s[FORWARD] + cosine * s[LEFT])
-    start[2] += lag * s[YAW_RATE]
+    _displace(s, s[SEEN_LAG], start)
+    start[2] += s[SEEN_LAG] * s[YAW_RATE]

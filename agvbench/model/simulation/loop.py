@@ -46,9 +46,9 @@ from agvbench.model.simulation.commands import next_drive, obey, reset_memory
 from agvbench.model.simulation.filtered_speed import (
     FILTER_SIZE,
     filter_speed,
-    missed_distance,
-    missed_speed,
+    position_error,
     reset_filter,
+    speed_error,
 )
 from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
 from agvbench.model.simulation.gaps import TOGETHER
@@ -136,7 +136,7 @@ def _actuate_only(
     plan: Floats,
     vehicle: Floats,
     servos: Floats,
-    seen: Floats,
+    filtered: Floats,
     bandwidth: float,
     now: float,
     until: float,
@@ -146,7 +146,7 @@ def _actuate_only(
     limit_body(s, p, vehicle, now)
     plan_command(plan, s, servos)
     if bandwidth < math.inf:
-        filter_speed(seen, plan, bandwidth, now, until, begin)
+        filter_speed(filtered, plan, bandwidth, now, until, begin)
     leave_command(plan, until - now, servos)
     recent = -math.expm1((now - until) / RECENT_SPEED_S)
     servos[5] += (servos[4] - servos[5]) * recent
@@ -155,14 +155,14 @@ def _actuate_only(
 
 @compiled(inner=True)
 def _begin_in_motion(
-    s: Floats, p: Floats, vehicle: Floats, servos: Floats, seen: Floats, now: float, initial: Floats, start: Floats
+    s: Floats, p: Floats, vehicle: Floats, servos: Floats, filtered: Floats, now: float, initial: Floats, start: Floats
 ) -> float:
     """Put the measured speed and yaw rate into `servos`, and the pose into `start`; return the lift of the level."""
     speed, weight = initial[INITIAL_SPEED], initial[YAW_RATE_WEIGHT]
     lift = level_lift(s, p, vehicle, servos, now, initial[RECENT_SPEED], speed)
-    servos[4] = drive_speed(s, p, vehicle, servos, now, speed) + missed_speed(seen, servos[4])
+    servos[4] = drive_speed(s, p, vehicle, servos, now, speed) + speed_error(filtered, servos[4])
     if initial[BANDWIDTH] < math.inf:
-        move_ahead(s, p, vehicle, servos, now, missed_distance(seen, initial[BANDWIDTH]), start)
+        move_ahead(s, p, vehicle, servos, now, position_error(filtered, initial[BANDWIDTH]), start)
     if weight > 0.0:
         s[FRONT], s[MEASURED_YAW_RATE], s[MEASURED_WEIGHT] = servos[2], initial[INITIAL_YAW_RATE], weight
         adopt(s, p)
@@ -188,7 +188,7 @@ def _drive_run(
     last: int,
     start: Floats,
     servos: Floats,
-    seen: Floats,
+    filtered: Floats,
     t_s: Floats,
     out: Floats,
     k: int,
@@ -196,7 +196,7 @@ def _drive_run(
 ) -> None:
     """Simulate one run, whose pose is held until `begin`; commands before that move the actuators only."""
     now, lift = -math.inf, 0.0
-    reset_filter(seen)
+    reset_filter(filtered)
     reset_memory(s, commands, settled, first, start[2])
     driven = front = rear = first
     while now < math.inf:
@@ -210,12 +210,12 @@ def _drive_run(
             now = min(begin, end)
         elif now < begin:
             until = min(begin, end)
-            _actuate_only(s, p, plan, vehicle, servos, seen, initial[BANDWIDTH], now, until, begin)
+            _actuate_only(s, p, plan, vehicle, servos, filtered, initial[BANDWIDTH], now, until, begin)
             now = until
         if now < end:
             if now == begin:
                 if not math.isnan(initial[INITIAL_SPEED]):
-                    lift = _begin_in_motion(s, p, vehicle, servos, seen, now, initial, start)
+                    lift = _begin_in_motion(s, p, vehicle, servos, filtered, now, initial, start)
                     obey(s, p, commands, settled, driven, front, rear, lift, now)
                 if s[SEEN_LAG] > 0.0:
                     see_late(s, p, vehicle, servos, now, start)
@@ -279,7 +279,7 @@ def simulate(
         (frames, 3): receives x, y, heading.
     """
     s, plan, work = np.zeros(SIZE), np.zeros(PLAN_SIZE), np.zeros(WORK_SIZE)
-    servos, start, seen = np.zeros(SERVOS_SIZE), np.zeros(START_SIZE), np.zeros(FILTER_SIZE)
+    servos, start, filtered = np.zeros(SERVOS_SIZE), np.zeros(START_SIZE), np.zeros(FILTER_SIZE)
     s[KNOWN_FRONT] = s[KNOWN_REAR] = math.nan
     for run in chosen:
         k, stop = starts[run], starts[run + 1]
@@ -301,5 +301,5 @@ def simulate(
         if k < stop:
             _drive_run(
                 s, p, plan, work, vehicle, begin, initial[run], commands, settled, command_t_s, first, last, start,
-                servos, seen, t_s, out, k, stop,
+                servos, filtered, t_s, out, k, stop,
             )  # fmt: skip
