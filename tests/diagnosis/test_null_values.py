@@ -10,18 +10,19 @@ from tiny_selector import selector_of
 from tiny_vehicle import HEADER, Tiny
 
 from agvbench.diagnosis.model.repeats import Repeats
-from agvbench.diagnosis.selection.candidates import candidates, default_candidate
+from agvbench.diagnosis.selection.candidates import candidate, candidates, default_candidate
+from agvbench.diagnosis.terms import TERMS
 from agvbench.effects import effect_kinds
 from agvbench.effects.variants import effect_variants
 
 
 @pytest.mark.parametrize("name", sorted(candidates(HEADER.geometry)))
 def test_the_first_start_is_near_the_null_value(name):
-    kinds, candidate = effect_kinds()[name].parameters(), default_candidate(name)
-    for p, value, scale in zip(kinds, candidate.starts[0], candidate.scale, strict=True):
+    kinds, tried = effect_kinds()[name].parameters(), default_candidate(name)
+    for p, value, scale in zip(kinds, tried.starts[0], tried.scale, strict=True):
         if not (p.is_direction or math.isinf(p.null)):
             assert abs(value - p.null) == pytest.approx(1e-3 * scale, rel=1e-6)
-    for p, most in zip(kinds, np.max(np.abs(candidate.starts), axis=0), strict=True):
+    for p, most in zip(kinds, np.max(np.abs(tried.starts), axis=0), strict=True):
         assert p.is_direction or math.isinf(p.null) or most == pytest.approx(p.scale)
 
 
@@ -31,6 +32,12 @@ def test_variants_start_at_shares_of_their_scale(name):
     amplitude = next((k for k, p in enumerate(kinds) if not (p.is_direction or math.isinf(p.null))), None)
     if amplitude is not None:
         assert np.min(np.abs(starts[:, amplitude])) > 1e-2 * kinds[amplitude].scale or kinds[amplitude].low > 0.0
+
+
+@pytest.mark.parametrize("kind", [*effect_kinds().values(), *effect_variants().values(), *TERMS], ids=lambda k: k.name)
+def test_no_fit_starts_twice_at_the_same_values(kind):
+    starts = candidate(kind).starts
+    assert len(starts) == len(np.unique(starts, axis=0))
 
 
 def test_a_quadratic_prediction_of_a_small_removal_is_close(tiny_campaign):

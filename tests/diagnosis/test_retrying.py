@@ -8,9 +8,16 @@ import numpy as np
 import pytest
 from tiny_vehicle import FRONT_M, HEADER, NEUTRAL_COMMAND, REAR_M, Tiny
 
+from agvbench.diagnosis.criteria import FIT
 from agvbench.diagnosis.data.readings import read_runs
 from agvbench.diagnosis.discrepancy import stepwise as empirical
-from agvbench.diagnosis.estimation.levenberg_marquardt import Convergence, FitState, LevenbergMarquardt
+from agvbench.diagnosis.estimation.levenberg_marquardt import (
+    Convergence,
+    FitState,
+    LevenbergMarquardt,
+    Step,
+    StepSolver,
+)
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.nodal_maps import ROLES, nodal_maps
 from agvbench.diagnosis.model.predictor import Predictor
@@ -113,3 +120,19 @@ def test_a_step_to_where_the_model_cannot_be_evaluated_ends_the_iteration(select
     calls[:] = [(), ()]
     with pytest.raises(np.linalg.LinAlgError, match="cannot be evaluated"):
         solver.iterate(start, 8)
+
+
+def test_steps_that_do_not_gain_what_they_predict_end_the_iteration(selector, monkeypatch):
+    base = selector.base()
+    solver = LevenbergMarquardt(base.fit.predictor, np.empty((0, 2)))
+    start = FitState(base.fit.parameters, base.fit.random_effects, base.fit.variance_components)
+    start, _ = solver.at_fixed_point(start, solver.evaluate(start))
+    steps = []
+
+    def stays(_, point, terms):
+        steps.append(terms)
+        return Step(point, False, 10.0 * FIT.converged)
+
+    monkeypatch.setattr(StepSolver, "step", stays)
+    iterated = solver.iterate(start, 10)
+    assert (len(steps), iterated.convergence) == (1, Convergence.SLOW)

@@ -168,20 +168,24 @@ class LevenbergMarquardt:
 
         The first steps use the derivatives from `near` if given. Once a step can reduce the objective by little, the
         model is nearly linear over the remaining steps, and these use the derivatives of that step (chord method). The
-        last step has derivatives of its own: where residuals are large, others lead to another point. A step to where
-        the model cannot be evaluated is undone, and ends the iteration.
+        last step has derivatives of its own: where residuals are large, others lead to another point. If it reduces
+        the loss by little although more was predicted, further ones will not either. A step to where the model cannot
+        be evaluated is undone, and ends the iteration.
         """
-        before, own = np.inf, None
+        before, own, had_own = np.inf, None, False
         known: FitState | None = None
         for step in range(iterations):
             try:
                 evaluation = self.evaluate(state, own if near is None else near)
                 known, reduction = state, before - evaluation.loss
+                if had_own and abs(reduction) < FIT.converged:
+                    break
                 state, taken = self._step(state, evaluation)
             except np.linalg.LinAlgError:
                 if known is None:
                     raise
                 return Iterated(known, Convergence.CONVERGED, None)
+            had_own = near is None and own is None
             before = evaluation.loss
             if near is not None:
                 if reduction < FIT.nearly_converged or step >= iterations // 2:

@@ -106,7 +106,8 @@ def candidate(kind: type[Effect]) -> Candidate:
         if p.is_direction:
             starts = np.repeat(starts, len(DIRECTIONS), axis=0)
             starts[:, k] = np.tile(DIRECTIONS, len(starts) // len(DIRECTIONS))
-    return Candidate(kind.name, bounds, scale, np.clip(starts, bounds[:, 0], bounds[:, 1]))
+    within = dict.fromkeys(map(tuple, np.clip(starts, bounds[:, 0], bounds[:, 1]).tolist()))
+    return Candidate(kind.name, bounds, scale, np.array([*within]))
 
 
 def _choices(p: Parameter, *, near_null: bool) -> list[float]:
