@@ -16,8 +16,8 @@ from __future__ import annotations
 import math
 
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation.actuators import speed_at
-from agvbench.model.simulation.gaps import TOGETHER
+from agvbench.model.simulation.actuators.gaps import TOGETHER
+from agvbench.model.simulation.actuators.plan import speed_at
 from agvbench.types import Floats
 
 # How long before a window it is simulated, and its longest step, in time constants 1 / ω of the filter.

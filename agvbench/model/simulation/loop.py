@@ -41,7 +41,8 @@ from agvbench.effects.state import (
     Y,
 )
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation.actuators import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
+from agvbench.model.simulation.actuators.gaps import TOGETHER
+from agvbench.model.simulation.actuators.plan import PLAN_SIZE, SERVOS_SIZE, leave_command, plan_command, step_length
 from agvbench.model.simulation.commands import next_drive, obey, reset_memory
 from agvbench.model.simulation.filtered_speed import (
     FILTER_SIZE,
@@ -51,7 +52,6 @@ from agvbench.model.simulation.filtered_speed import (
     speed_error,
 )
 from agvbench.model.simulation.frames import follow_seen, report_step, see_step, start_run, wait
-from agvbench.model.simulation.gaps import TOGETHER
 from agvbench.model.simulation.layout import (
     BANDWIDTH,
     COUNT,

@@ -35,7 +35,7 @@ from agvbench.effects.state import (
     Y,
 )
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation.actuators import actuate
+from agvbench.model.simulation.actuators.plan import actuate
 from agvbench.model.simulation.layout import (
     ALONG_X,
     ALONG_Y,

@@ -2,7 +2,7 @@
 """Axles behind servos of second order, with a backlash: the times at which they stop and move on.
 
 From one reversal of the servo to the next its motion is monotone. The axle stands until the servo takes it along, which
-is bisected. An array, the *plan*, holds the servo's response (`agvbench.model.simulation.servos`) and the axle.
+is bisected. An array, the *plan*, holds the servo's response (`servos`) and the axle.
 """
 
 from __future__ import annotations
@@ -10,8 +10,16 @@ from __future__ import annotations
 import math
 
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation.gaps import RAMP_STEP_S, SHORTEST_S, TOGETHER
-from agvbench.model.simulation.servos import INERT, SETTLED_S, TURNS_EVERY_S, TURNS_S, WAY_SIZE, longest_step, way_at
+from agvbench.model.simulation.actuators.gaps import RAMP_STEP_S, SHORTEST_S, TOGETHER
+from agvbench.model.simulation.actuators.servos import (
+    INERT,
+    SETTLED_S,
+    TURNS_EVERY_S,
+    TURNS_S,
+    WAY_SIZE,
+    longest_step,
+    way_at,
+)
 from agvbench.types import Floats
 
 # After the response: aim, half the backlash, and the position of the axle at the last reversal; then the next reversal,

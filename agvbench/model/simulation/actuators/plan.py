@@ -1,12 +1,11 @@
 # mypy: warn-return-any=False
 """Servos and drive while one command is in force, in closed form.
 
-A servo obeys δ̇ = (aim − δ) / lag within ± rate (`agvbench.model.simulation.gaps`). Its motion is monotone, so that the
-position of the axle behind a backlash follows from the initial positions. Servos of second order are in
-`agvbench.model.simulation.servos`, their axles in `agvbench.model.simulation.followers`. The drive obeys
-v̇ = (aim − v) / lag within limits of v̇, as a servo does; to reverse it brakes to rest first. A drive with inertia, and
-an elastic drive train without power, obey an equation of second order in v, that of a servo with inertia. An array, the
-*plan*, holds all of this.
+A servo obeys δ̇ = (aim − δ) / lag within ± rate (`gaps`). Its motion is monotone, so that the position of the axle
+behind a backlash follows from the initial positions. Servos of second order are in `servos`, their axles in
+`followers`. The drive obeys v̇ = (aim − v) / lag within limits of v̇, as a servo does; to reverse it brakes to rest
+first. A drive with inertia, and an elastic drive train without power, obey an equation of second order in v, that of a
+servo with inertia. An array, the *plan*, holds all of this.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from agvbench.effects.state import (
     STEERING_RATE,
 )
 from agvbench.model.compiled import compiled
-from agvbench.model.simulation.followers import (
+from agvbench.model.simulation.actuators.followers import (
     AIM,
     AXLE,
     FOLLOWER_SIZE,
@@ -48,7 +47,7 @@ from agvbench.model.simulation.followers import (
     way_position,
     within_way,
 )
-from agvbench.model.simulation.gaps import (
+from agvbench.model.simulation.actuators.gaps import (
     GAP_SETTLED_S,
     GAP_SIZE,
     SHORTEST_S,
@@ -59,7 +58,7 @@ from agvbench.model.simulation.gaps import (
     reaches_s,
     within_gap,
 )
-from agvbench.model.simulation.servos import (
+from agvbench.model.simulation.actuators.servos import (
     CRUISED_S,
     FIRST_ORDER,
     INERT,

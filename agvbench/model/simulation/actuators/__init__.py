@@ -1,0 +1,1 @@
+"""Servos and drive while one command is in force: their motion in closed form, and its kinks."""
