@@ -5,10 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from tiny_selector import selector_of
 from tiny_vehicle import Tiny
 
-from agvbench.diagnosis.selection.initial_steering import reconsider_initial_steering, under_other_initial_steering
+from agvbench.diagnosis.selection.initial_steering import (
+    reconsider_initial_steering,
+    select_with_initial_steering,
+    under_other_initial_steering,
+)
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.validation import predicts
 from agvbench.diagnosis.selection.variants import prefers_other_initial_steering, with_extended_library
@@ -24,6 +29,18 @@ def test_another_cause_decides_on_the_initial_steering_again(tiny_campaign):
     selection, selector = reconsider_initial_steering(slipping, wrong)
     assert not selector.batch.readings.preset
     assert {"lateral_slip", "steering_backlash"} <= {*selection.chosen.names}
+
+
+@pytest.mark.parametrize("begins_right", [True, False])
+def test_the_initial_steering_is_changed_while_effects_are_selected(tiny_campaign, begins_right):
+    right = selector_of(tiny_campaign(Tiny(slip=0.3, play_rad=0.06)))
+    said: list[str] = []
+    right.on_progress = said.append
+    selection, selector = select_with_initial_steering(right if begins_right else under_other_initial_steering(right))
+    assert not selector.batch.readings.preset
+    assert {"lateral_slip", "steering_backlash"} <= {*selection.chosen.names}
+    steps = [line.partition(": gains")[0] for line in said if ": gains" in line]
+    assert len({*steps}) == len(steps) >= 2  # no step was repeated
 
 
 def test_without_a_gain_the_initial_steering_stays(tiny_campaign):

@@ -12,6 +12,7 @@ from agvbench.calibration import inspect_frames
 from agvbench.campaign.campaign import session_starts
 from agvbench.diagnosis.data.initial_pose import frame_noise, initial_pose, shift_commands_half_a_row, unwrapped_poses
 from agvbench.diagnosis.data.logged import NO_LOGGED_COLUMNS, LoggedColumns, logged_columns
+from agvbench.diagnosis.data.merged_commands import CommandMerging
 from agvbench.diagnosis.data.session_clocks import ClockOffset
 from agvbench.diagnosis.data.splits import group_runs, with_common_levels
 from agvbench.diagnosis.data.windows import (
@@ -53,7 +54,8 @@ class Readings:
     settled at each run's first steering command before it was given, and False if they were at neutral; windows begin
     with the axle angles of earlier commands if it is True, and with the measured yaw rate otherwise. ``priors`` are
     separate measurements of the effects' parameters, which belong to the evidence of every model. ``logged`` are the
-    columns that the lab logged. ``clock_offsets`` are those of sessions of free driving.
+    columns that the lab logged. ``clock_offsets`` are those of sessions of free driving. ``merging`` is that of the
+    commands of windows.
     """
 
     runs: tuple[Run, ...]
@@ -69,6 +71,7 @@ class Readings:
     priors: tuple[Prior, ...] = ()
     logged: LoggedColumns = NO_LOGGED_COLUMNS
     clock_offsets: Mapping[str, ClockOffset] = field(default_factory=dict)
+    merging: CommandMerging | None = None
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -101,6 +104,7 @@ class Readings:
             self.priors,
             self.logged.select(chosen),
             self.clock_offsets,
+            self.merging,
         )
 
     def simulated(self) -> list[SimulatedRun]:
@@ -119,8 +123,8 @@ class Readings:
         ]
 
     def _commands(self, run: Run) -> Commands:
-        """Return the commands of a run; those of windows without repeats, because loggers repeat them."""
-        return run.commands if self.initial_states is None else run.commands.without_repeats()
+        """Return the commands of a run; those of windows are merged."""
+        return run.commands if self.merging is None else self.merging.merged(run.commands)
 
     def _preset(self, commands: Commands) -> tuple[float, float] | None:
         from_rest = self.initial_states is None
@@ -191,7 +195,10 @@ def read_windows(
     group = blocks(windows, horizon)
     cut = tuple(w.run for w in windows)
     logged = _logged_of_windows(cut, initial_states.t_s, t_s, started_h, horizon) if cut else NO_LOGGED_COLUMNS
-    return Readings(cut, t_s, poses, start, stderr, started_h, group, refused, initial_states, logged=logged)
+    merging = CommandMerging.of(every, neutral)
+    return Readings(
+        cut, t_s, poses, start, stderr, started_h, group, refused, initial_states, logged=logged, merging=merging
+    )
 
 
 def _logged_of_windows(

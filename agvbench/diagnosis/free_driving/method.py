@@ -33,7 +33,7 @@ from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.result import Diagnosis
 from agvbench.diagnosis.selection.actuators import ACTUATORS, separate_channels
 from agvbench.diagnosis.selection.candidates import given_effects
-from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, reconsider_initial_steering
+from agvbench.diagnosis.selection.initial_steering import choose_initial_steering, select_with_initial_steering
 from agvbench.diagnosis.selection.stepwise import Selection
 from agvbench.diagnosis.selection.variants import candidates_for
 from agvbench.errors import CampaignError
@@ -126,8 +126,7 @@ class FreeDriving(Method[SelectedFromWindows]):
     @staticmethod
     def _selected_effects(selector: WindowSelector) -> tuple[Selection, WindowSelector]:
         """Return the effects, by channel and with variants where these predict better, and their selector."""
-        selector = choose_initial_steering(selector)
-        selection, selector = reconsider_initial_steering(selector.select(), selector)
+        selection, selector = select_with_initial_steering(choose_initial_steering(selector))
         separate, selector = separate_channels(selection, selector)
         if separate is not selection:
             selection = selector.select(separate.chosen, ACTUATORS)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agvbench.diagnosis.criteria import FIT, SELECTION
+from agvbench.diagnosis.criteria import FIT, SELECTION, SelectionCriteria
 from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.data.window_splits import fold_groups
 from agvbench.diagnosis.estimation.cross_validation import FOLDS, cross_validated
@@ -113,10 +114,11 @@ class ScoredModel:
 class FittedModels:
     """Fits and cross-validates models of the training runs.
 
-    ``given`` are effects that the vehicle is known to have. Every model contains them, with parameters fitted from
-    ``given_values``. ``tried`` counts the fitted models.
+    ``criteria`` are those of the selection. ``given`` are effects that the vehicle is known to have. Every model
+    contains them, with parameters fitted from ``given_values``. ``tried`` counts the fitted models.
     """
 
+    criteria: ClassVar[SelectionCriteria] = SELECTION
     batch: Batch
     candidates: dict[str, Candidate]
     start: Floats
@@ -165,7 +167,7 @@ class FittedModels:
         starts = frozenset(start for start in current.starts if start[0] != name)
         maps, base_maps = (model.fit.parameters[: self.batch.maps.size] for model in (current, base))
         without = self.score(names, np.r_[maps, kept], current.fit, starts=starts)
-        if current.fit_gain_over(without) < FIT.large_loss_of_removal:
+        if current.fit_gain_over(without) < self.criteria.large_loss_of_removal:
             return without
         again = starts | {(f"maps without {name}", base_maps.tobytes())}
         try:
@@ -321,6 +323,28 @@ class FittedModels:
         """Return a model of other runs, or under other assumptions, fitted to these; None if the fit diverges."""
         try:
             return self.score(model.names, model.fit.parameters, None)
+        except np.linalg.LinAlgError:
+            return None
+
+    def refitted_if_better(self, model: ScoredModel) -> ScoredModel | None:
+        """Return a model of these runs under other assumptions, fitted under those of this selector.
+
+        None if its first steps are not expected to lead to less loss, or if the fit diverges.
+        """
+        own = model.fit
+        try:
+            preliminary = fit(
+                self._predictor(model.names),
+                own.parameters,
+                own.bounds,
+                random_effects=own.random_effects,
+                variance_components=own.variance_components,
+                iterations=FIT.few_steps,
+                near=own.linear,
+            )
+            if preliminary.total_loss - preliminary.decrement > own.total_loss:
+                return None
+            return self.score(model.names, preliminary.parameters, preliminary)
         except np.linalg.LinAlgError:
             return None
 

@@ -34,6 +34,22 @@ def choose_initial_steering(selector: AnySelector) -> AnySelector:
     return other if _is_better_beside(other, other.adopt(base), selector, base) else selector
 
 
+def select_with_initial_steering(selector: AnySelector) -> tuple[Selection, AnySelector]:
+    """Select effects, and change the hypothesis as soon as the model predicts clearly better under the other one.
+
+    Beside the wrong hypothesis, effects that compensate for it would be selected in the further steps.
+    """
+    here, other = selector, under_other_initial_steering(selector)
+    current = here.base()
+    while True:  # each step and each change reduces the deviance
+        larger, rejected = here.step(current)
+        if larger is None:
+            return reconsider_initial_steering(here.completed(current, rejected), here)
+        current, there = larger, other.refitted_if_better(larger)
+        if there is not None and there.deviance < current.deviance - SELECTION.min_gain:
+            here, other, current = other, here, there
+
+
 def reconsider_initial_steering(selection: Selection, selector: AnySelector) -> tuple[Selection, AnySelector]:
     """Repeat the selection under the other hypothesis if the selected model predicts clearly better under it.
 

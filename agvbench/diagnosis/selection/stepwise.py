@@ -9,7 +9,7 @@ from typing import ClassVar, Self, TypeVar
 
 import numpy as np
 
-from agvbench.diagnosis.criteria import SELECTION, SelectionCriteria
+from agvbench.diagnosis.criteria import SELECTION
 from agvbench.diagnosis.estimation.cross_validation import differs_from_null, fits_better, trimmed_gain
 from agvbench.diagnosis.estimation.fit import Fit
 from agvbench.diagnosis.model.batch import Batch
@@ -57,7 +57,6 @@ class Selector(FittedModels):
     gain.
     """
 
-    criteria: ClassVar[SelectionCriteria] = SELECTION
     further_kinds: ClassVar[frozenset[str] | None] = None
     finds_alternatives: ClassVar[bool] = True
     always_fitted: ClassVar[frozenset[str]] = frozenset()
@@ -88,16 +87,26 @@ class Selector(FittedModels):
 
         A model that was `begun` is continued; its effects with a cause in `group` are alike.
         """
-        base = self.base()
-        current = base if begun is None else begun
-        rejected: dict[str, float] = {}
+        current = self.base() if begun is None else begun
         while True:  # ends when no effect meets the criterion: there are only so many candidates
-            larger, accepted = self._with_one_more(current)
-            rejected = {name: model.gain_over(current) for name, model in larger.items()}
-            if not accepted:
-                break
-            current = self.preferred(accepted)
-            self.on_progress(f"{' + '.join(current.names)}: gains {base.deviance - current.deviance:.0f}")
+            larger, gains = self.step(current)
+            if larger is None:
+                return self.completed(current, gains, group)
+            current = larger
+
+    def step(self, current: ScoredModel) -> tuple[ScoredModel | None, dict[str, float]]:
+        """Return `current` with the best effect that meets the criterion, None if none does, and the gain of each."""
+        tried, accepted = self._with_one_more(current)
+        gains = {name: model.gain_over(current) for name, model in tried.items()}
+        if not accepted:
+            return None, gains
+        larger = self.preferred(accepted)
+        self.on_progress(f"{' + '.join(larger.names)}: gains {self.base().deviance - larger.deviance:.0f}")
+        return larger, gains
+
+    def completed(self, current: ScoredModel, rejected: dict[str, float], group: Iterable[str] = ()) -> Selection:
+        """Return the selection of `current` without the effects that it does not need; `rejected` gain too little."""
+        base = self.base()
         current, gains = self.backward_elimination(base, current, group)
         alternatives = self.alternatives(base, current) if self.finds_alternatives else {}
         rejected = {name: gain for name, gain in rejected.items() if name not in current.names}

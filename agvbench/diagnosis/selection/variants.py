@@ -261,7 +261,8 @@ def _swapped_models(
         if model.fit_gain_over(current) < -VARIANT.max_fit_loss or model.deviance > least + extended.min_gain:
             continue
         present = {*current.names} - {one.replaced, *extended.given}
-        others = [name for name in current.names if name in present and _may_be_unnecessary(name, current, model)]
+        most = extended.criteria.max_predicted_loss
+        others = [name for name in current.names if name in present and _may_be_unnecessary(name, current, model, most)]
         with suppress(np.linalg.LinAlgError):
             smaller += [
                 (one, substituted(extended, current, {one.replaced, other}, _variant_candidate(one)))
@@ -270,10 +271,10 @@ def _swapped_models(
     return swapped + smaller
 
 
-def _may_be_unnecessary(name: str, current: ScoredModel, model: ScoredModel) -> bool:
-    """Return whether the effect called `name` explains little beside a variant, or much less than in `current`."""
+def _may_be_unnecessary(name: str, current: ScoredModel, model: ScoredModel, most: float) -> bool:
+    """Return whether an effect is predicted to explain at `most` that beside a variant, or much less than before."""
     predicted, before = (one.fit.predicted_loss_without(name) for one in (model, current))
-    return predicted < max(VARIANT.max_predicted_loss, VARIANT.max_share_of_loss * before)
+    return predicted < max(most, VARIANT.max_share_of_loss * before)
 
 
 def _variant_candidate(replacement: _Replacement) -> Candidate:
