@@ -64,6 +64,10 @@ _QUATERNION = 'quaternion = { x = "X", y = "X", z = "X", w = "X", floor_x = "z",
 _GATE = "[gate]\nmax_speed_m_per_s = 1.0\nmax_yaw_rate_rad_per_s = -5.0\n"
 
 CASES: Cases = {
+    "recording-times-coarse": (
+        "times of poses rounded to a tenth of a second",
+        lambda: _import(t=[100 * round(row / 10) for row in range(60)]),
+    ),
     "mapping-absent": (
         "a mapping that is neither a file nor built in",
         lambda: import_recordings("drat", ["r.csv"], "c"),

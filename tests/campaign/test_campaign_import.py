@@ -39,6 +39,16 @@ def test_units_axes_and_held_commands(tmp_path: Path) -> None:
     assert not run.target.is_finite
 
 
+@pytest.mark.parametrize(("every_ms", "is_standing"), [(20, False), (50, False), (500, True)])
+def test_times_that_are_a_little_coarse_are_imported(tmp_path: Path, every_ms: int, is_standing: bool) -> None:
+    table = recording(200)
+    table["t"] = [every_ms * (t // every_ms) for t in table["t"]]
+    if is_standing:  # a camera may repeat the pose of a vehicle at rest
+        table["Z"] = [0.0] * 200
+    run = next(iter(_imported(tmp_path, r=table)))
+    assert len(run.frames) == 200
+
+
 def test_rows_are_accounted_for_one_by_one(tmp_path: Path) -> None:
     table = recording(400)
     table["armed"] = [0] * 50 + [1] * 350

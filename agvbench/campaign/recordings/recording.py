@@ -116,11 +116,12 @@ def combine(
     Raises
     ------
     FileError
-        If poses and commands have no time in common.
+        If poses and commands have no time in common, or times are much coarser than poses.
     """
     rows = len(poses.t_s)
     every = np.ones(rows, np.bool_)
     seen = poses.seen & flags.get("tracked", every)
+    _require_fine_times(path, poses.t_s[seen], poses.x_m[seen], poses.y_m[seen])
     wild = np.zeros(rows, np.bool_)
     if mapping.gate:
         positions = (poses.x_m[seen], poses.y_m[seen], poses.heading_rad[seen])
@@ -159,6 +160,26 @@ def _require_common_time(path: Path, poses: Poses, commands: Commands) -> None:
         raise _apart(path, "all poses are long after the last command", told)
 
 
+def _require_fine_times(path: Path, t_s: Floats, x_m: Floats, y_m: Floats) -> None:
+    """Raise `FileError` if most poses that moved have the time of the pose before, and times are far apart."""
+    moved = np.hypot(np.diff(x_m), np.diff(y_m)) > _MOVED_M
+    shared = moved & (np.diff(t_s) == 0.0)
+    later_s = np.diff(np.unique(t_s))
+    if 2 * np.count_nonzero(shared) <= np.count_nonzero(moved) or not len(later_s):
+        return
+    interval_s = float(np.median(later_s))
+    if interval_s > _COARSEST_S * (1.0 + _ROUNDING):
+        share = np.count_nonzero(shared) / np.count_nonzero(moved)
+        raise FileError(
+            "times are coarser than poses",
+            where=path,
+            value=f"{share:.0%} of the poses that moved have the time of the pose before, and times are "
+            f"{interval_s:.3g} s apart",
+            limit=f"{_COARSEST_S:g} s apart",
+            remedy="write times with more digits",
+        )
+
+
 def _apart(path: Path, what: str, told: str) -> FileError:
     remedy = 'give both one clock: correct their times in the mapping (of a bag: time = "received" or "header")'
     return FileError(what, where=path, value=told, remedy=remedy)
@@ -166,3 +187,6 @@ def _apart(path: Path, what: str, told: str) -> FileError:
 
 _LONGEST_HELD_S = 60.0
 """A last command that has been held for longer before the first pose is of another clock."""
+
+_MOVED_M, _COARSEST_S, _ROUNDING = 1e-3, 0.05, 1e-6
+"""Poses that are further apart than noise are different ones, and one that is so early or late is a wrong one."""
