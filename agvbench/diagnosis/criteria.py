@@ -29,6 +29,9 @@ class DataCriteria:
         Windows of free driving, and blocks of 10 s. Adjacent windows are strongly correlated, and blocks are not.
     ``max_fitted_windows``, ``max_assessed_windows``
         Windows in a fit, and windows for which errors are reported, evenly spaced.
+    ``max_fitted_commands``, ``min_fitted_windows``
+        A fit has fewer windows, but no fewer than these, where so many commands take effect within them: time grows
+        with their number. Most windows of ten minutes overlap, and tell little more than those that do not.
     """
 
     min_runs: int = 20
@@ -40,6 +43,8 @@ class DataCriteria:
     min_blocks: int = 5
     max_fitted_windows: int = 300
     max_assessed_windows: int = 1500
+    max_fitted_commands: int = 8000
+    min_fitted_windows: int = 100
 
 
 @dataclass(frozen=True)

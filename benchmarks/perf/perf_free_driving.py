@@ -35,12 +35,13 @@ NOISE_M, NOISE_RAD = 3e-4, 8e-4
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of vehicle: its header, and neutral and range of the commands that a joystick gives."""
+    """A kind of vehicle: its header, neutral and range of its commands, and 1 if its rear axle is steered, else 0."""
 
     header: CampaignHeader
     neutral: float
     drive: float
     steering: float
+    rear: float
 
     @classmethod
     def of(cls, *, is_differential: bool) -> Kind:
@@ -51,12 +52,12 @@ class Kind:
                 channels=Channels.alike("si"), prediction_horizon_s=2.0, prediction_stride_s=1.0,
                 kinematics="differential",
             )  # fmt: skip
-            return cls(header, 0.0, 0.5, 1.0)
+            return cls(header, 0.0, 0.5, 1.0, 0.0)
         header = CampaignHeader(
             schema=4, name="free", vehicle_name="car", front_axle_m=0.1, rear_axle_m=0.1, mocap_rate_hz=100.0,
             channels=Channels.alike("us"), prediction_horizon_s=2.0, prediction_stride_s=1.0,
         )  # fmt: skip
-        return cls(header, 1500.0, 350.0, 350.0)
+        return cls(header, 1500.0, 350.0, 350.0, 1.0)
 
 
 def steps(seconds: float, size: float, every_s: float, rng: np.random.Generator) -> np.ndarray:
@@ -83,7 +84,7 @@ def recorded(
     for session in range(SESSIONS):
         drive = kind.neutral + driver(seconds, kind.drive, 1.7, rng)
         front = kind.neutral + driver(seconds, kind.steering, 1.1, rng)
-        rear = kind.neutral + driver(seconds, kind.steering, 1.9, rng)
+        rear = kind.neutral + kind.rear * driver(seconds, kind.steering, 1.9, rng)
         plant.reset((0.0, 0.0, 0.0), seed=session)
         frame_s = np.arange(0.0, seconds - 1e-9, 1.0 / rate_hz)
         own = np.minimum((frame_s / interval_s + 1e-9).astype(int), len(drive) - 1)

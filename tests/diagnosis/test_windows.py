@@ -12,8 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tiny_vehicle import HEADER, NEUTRAL, NEUTRAL_COMMAND, Tiny, campaign_runs
 
+from agvbench.diagnosis.criteria import DATA
+from agvbench.diagnosis.data import window_splits
 from agvbench.diagnosis.data.readings import Readings, read_windows
-from agvbench.diagnosis.data.window_splits import held_out_windows, thinned
+from agvbench.diagnosis.data.window_splits import fitted_windows, held_out_windows, thinned
 from agvbench.diagnosis.data.windows import Horizon, RecordedMotion, Window, cut_windows, horizon_of
 from agvbench.diagnosis.free_driving.errors import WindowErrors, interval, repeatability_squares, squares
 from agvbench.diagnosis.free_driving.maps import smooth_maps, start_values_of_windows
@@ -301,6 +303,23 @@ def test_thinning_keeps_order_and_ends(count, most):
     assert (np.diff(kept) > 0).all()
     assert kept[0] == 0
     assert kept[-1] == count - 1
+
+
+def test_windows_full_of_commands_are_fitted_in_smaller_number(readings, monkeypatch):
+    inside = sum(
+        np.count_nonzero(run.commands.t_s > begins_s)
+        for run, begins_s in zip(readings.simulated(), readings.begins_s, strict=True)
+    )
+
+    def fitted(**limits: int) -> Readings:
+        monkeypatch.setattr(window_splits, "DATA", dataclasses.replace(DATA, **limits))
+        return fitted_windows(readings)
+
+    assert len(fitted(max_fitted_commands=inside)) == len(readings)
+    half = fitted(max_fitted_commands=inside // 2, min_fitted_windows=1)
+    assert len(half) == pytest.approx(len(readings) / 2, abs=1.0)
+    assert (half.runs[0], half.runs[-1]) == (readings.runs[0], readings.runs[-1])
+    assert len(fitted(max_fitted_commands=1, min_fitted_windows=20)) == 20
 
 
 def test_errors_are_told_by_recording_with_intervals_over_stretches(readings):

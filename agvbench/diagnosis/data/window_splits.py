@@ -91,3 +91,14 @@ def thinned(index: NDArray[np.int64], most: int) -> NDArray[np.int64]:
     if len(index) <= most:
         return index
     return index[np.unique(np.round(np.linspace(0, len(index) - 1, most)).astype(np.int64))]
+
+
+def fitted_windows(training: Readings) -> Readings:
+    """Return evenly spaced windows of the `training`, the fewer the more commands take effect within each."""
+    fitted = training.select(thinned(np.arange(len(training)), DATA.max_fitted_windows))
+    simulated = zip(fitted.simulated(), fitted.begins_s, strict=True)
+    commands = sum(np.count_nonzero(run.commands.t_s > begins_s) for run, begins_s in simulated)
+    if commands <= DATA.max_fitted_commands:
+        return fitted
+    most = max(DATA.min_fitted_windows, round(len(fitted) * DATA.max_fitted_commands / commands))
+    return training.select(thinned(np.arange(len(training)), most))

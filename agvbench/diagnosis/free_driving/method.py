@@ -16,7 +16,7 @@ from agvbench.diagnosis.data.initial_pose import is_driven
 from agvbench.diagnosis.data.readings import Readings, read_windows
 from agvbench.diagnosis.data.session_clocks import aligned, clock_offsets
 from agvbench.diagnosis.data.splits import Split
-from agvbench.diagnosis.data.window_splits import held_out_windows, test_sessions, thinned
+from agvbench.diagnosis.data.window_splits import fitted_windows, held_out_windows, test_sessions, thinned
 from agvbench.diagnosis.data.windows import Horizon
 from agvbench.diagnosis.design.propose import with_next_experiment
 from agvbench.diagnosis.estimation.fit import Fit, fit
@@ -115,7 +115,7 @@ class FreeDriving(Method[SelectedFromWindows]):
 
     def select(self, readings: Readings, split: Split) -> SelectedFromWindows:
         """Select effects in evenly spaced training windows."""
-        fitted = readings.select(thinned(np.flatnonzero(split.training), DATA.max_fitted_windows))
+        fitted = fitted_windows(readings.select(split.training))
         self.on_progress(f"{len(fitted)} training windows, {np.count_nonzero(split.test)} test windows")
         static = static_maps(fitted, readings.runs, self.context.geometry, self.context.header.neutral)
         levels = self._drive_levels(readings, split, static)
