@@ -30,8 +30,8 @@ class DataCriteria:
     ``max_fitted_windows``, ``max_assessed_windows``
         Windows in a fit, and windows for which errors are reported, evenly spaced.
     ``max_fitted_commands``, ``min_fitted_windows``
-        A fit has fewer windows, but no fewer than these, where so many commands take effect within them: time grows
-        with their number. Most windows of ten minutes overlap, and tell little more than those that do not.
+        A fit has fewer windows, but no fewer than these, where more commands take effect within them: time grows with
+        their number. With 121 of 300 windows an effect of a simulated vehicle gained 47 % as much.
     """
 
     min_runs: int = 20
