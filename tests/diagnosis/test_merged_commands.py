@@ -38,7 +38,7 @@ def driven_by_hand(draw: st.DrawFn) -> Commands:
 
 @given(driven_by_hand())
 def test_merged_commands_are_as_exact_as_time_stamps(own):
-    merged = MERGING.merged(own)
+    merged = MERGING.merged(own, 0.0)
     assert {*merged.t_s} <= {*own.t_s}
     assert merged.t_s[0] == own.t_s[0]
     assert merged.at(-1) == own.at(-1) or own.at(-1) == own.at(-2)
@@ -51,7 +51,7 @@ def test_merged_commands_are_as_exact_as_time_stamps(own):
 
 @given(driven_by_hand())
 def test_neutral_stays_neutral_and_sides_stay_apart(own):
-    merged = MERGING.merged(own)
+    merged = MERGING.merged(own, 0.0)
     at = np.searchsorted(merged.t_s, own.t_s, side="right") - 1
     for role in ("drive", "front"):
         assert np.array_equal(np.sign(getattr(merged, role)[at]), np.sign(getattr(own, role)))
@@ -60,20 +60,30 @@ def test_neutral_stays_neutral_and_sides_stay_apart(own):
 @given(driven_by_hand())
 def test_what_does_not_change_is_exact(own):
     held = Commands(own.t_s, np.full(len(own), 0.1), own.front, own.rear)
-    assert {*MERGING.merged(held).drive} == {0.1}
+    assert {*MERGING.merged(held, 0.0).drive} == {0.1}
 
 
 def test_a_slow_stick_costs_few_rows():
     t_s = np.arange(0.0, 10.0, 0.02)
     own = commands(t_s, np.full(len(t_s), 0.3), 0.4 * np.sin(0.5 * t_s))
-    assert 5 * len(MERGING.merged(own)) < 2 * len(own)
+    assert 5 * len(MERGING.merged(own, 0.0)) < 2 * len(own)
+
+
+def test_commands_long_before_a_window_are_merged_for_longer():
+    t_s = np.arange(0.0, 20.0, 0.02)
+    own = commands(t_s, np.full(len(t_s), 0.3), 0.4 * np.sin(0.5 * t_s))
+    all_inside, all_before = (MERGING.merged(own, begins_s) for begins_s in (0.0, 30.0))
+    mixed = MERGING.merged(own, 10.0)
+    assert 2 * len(all_before) < len(all_inside)
+    assert np.count_nonzero(mixed.t_s > 9.0) == pytest.approx(np.count_nonzero(all_inside.t_s > 9.0), abs=2)
+    assert np.count_nonzero(mixed.t_s < 7.0) == pytest.approx(np.count_nonzero(all_before.t_s < 7.0), abs=2)
 
 
 @pytest.mark.parametrize("every_s", [0.05, 0.1, 0.5])
 def test_steps_are_left_as_they_are(every_s):
     t_s = every_s * np.arange(20)
     own = commands(t_s, np.where(np.arange(20) % 2, 0.4, 0.2), np.linspace(-0.4, 0.5, 20))
-    merged = MERGING.merged(own)
+    merged = MERGING.merged(own, 0.0)
     for role in ("t_s", "drive", "front", "rear"):
         np.testing.assert_array_equal(getattr(merged, role), getattr(own, role))
 

@@ -109,22 +109,24 @@ class Readings:
 
     def simulated(self) -> list[SimulatedRun]:
         """Return the runs for simulation, at the times of the samples."""
-        initial_states = [None] * len(self) if self.initial_states is None else self.initial_states.t_s.tolist()
+        starts = [None] * len(self) if self.initial_states is None else self.initial_states.t_s.tolist()
         return [
-            SimulatedRun(self._commands(run), t, float(h), b, self._preset(run.commands), tuple(logged))
+            SimulatedRun(self._commands(run, b), t, float(h), b, self._preset(run.commands), tuple(logged))
             for run, t, h, b, logged in zip(
                 self.runs,
                 self.t_s,
                 self.started_h,
-                initial_states,
+                starts,
                 self.logged.standardised(len(self)).tolist(),
                 strict=True,
             )
         ]
 
-    def _commands(self, run: Run) -> Commands:
+    def _commands(self, run: Run, begins_s: float | None) -> Commands:
         """Return the commands of a run; those of windows are merged."""
-        return run.commands if self.merging is None else self.merging.merged(run.commands)
+        if self.merging is None or begins_s is None:
+            return run.commands
+        return self.merging.merged(run.commands, begins_s)
 
     def _preset(self, commands: Commands) -> tuple[float, float] | None:
         from_rest = self.initial_states is None
