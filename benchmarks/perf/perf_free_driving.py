@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,13 +35,12 @@ NOISE_M, NOISE_RAD = 3e-4, 8e-4
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of vehicle: its header, neutral and range of its commands, and 1 if its rear axle is steered, else 0."""
+    """A kind of vehicle: its header, and neutral and range of its commands."""
 
     header: CampaignHeader
     neutral: float
     drive: float
     steering: float
-    rear: float
 
     @classmethod
     def of(cls, *, is_differential: bool) -> Kind:
@@ -52,12 +51,12 @@ class Kind:
                 channels=Channels.alike("si"), prediction_horizon_s=2.0, prediction_stride_s=1.0,
                 kinematics="differential",
             )  # fmt: skip
-            return cls(header, 0.0, 0.5, 1.0, 0.0)
+            return cls(header, 0.0, 0.5, 1.0)
         header = CampaignHeader(
             schema=4, name="free", vehicle_name="car", front_axle_m=0.1, rear_axle_m=0.1, mocap_rate_hz=100.0,
             channels=Channels.alike("us"), prediction_horizon_s=2.0, prediction_stride_s=1.0,
         )  # fmt: skip
-        return cls(header, 1500.0, 350.0, 350.0, 1.0)
+        return cls(header, 1500.0, 350.0, 350.0)
 
 
 def steps(seconds: float, size: float, every_s: float, rng: np.random.Generator) -> np.ndarray:
@@ -81,10 +80,11 @@ def recorded(
     """Drive `plant` in `SESSIONS` sessions, by `hand` or by steps; return what a camera sees of it."""
     seconds, runs = 60.0 * minutes / SESSIONS, []
     driver, interval_s = (by_hand, BY_HAND_S) if hand else (steps, STEPS_S)
+    has_rear_axle = not kind.header.geometry.is_differential
     for session in range(SESSIONS):
         drive = kind.neutral + driver(seconds, kind.drive, 1.7, rng)
         front = kind.neutral + driver(seconds, kind.steering, 1.1, rng)
-        rear = kind.neutral + kind.rear * driver(seconds, kind.steering, 1.9, rng)
+        rear = kind.neutral + has_rear_axle * driver(seconds, kind.steering, 1.9, rng)
         plant.reset((0.0, 0.0, 0.0), seed=session)
         frame_s = np.arange(0.0, seconds - 1e-9, 1.0 / rate_hz)
         own = np.minimum((frame_s / interval_s + 1e-9).astype(int), len(drive) - 1)
@@ -110,19 +110,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print(f"{'vehicle':24s} {'frames':>7s} {'ours':>8s}  {'bound':>7s}  met?  yardstick  answer")
     for is_differential in (False, True):
         kind = Kind.of(is_differential=is_differential)
-        shipped, drawn = (
-            (differential_plant, random_differential_plant) if is_differential else (make_plant, random_plant)
-        )
-        name = "differential" if is_differential else "two axles"
-
-        def timed(title: str, plant: Plant, number: int, *, hand: bool = False, kind: Kind = kind) -> None:
+        for name, plant, number, hand in vehicles(wanted.seeds, is_differential=is_differential):
             rng = np.random.default_rng([0xF4EE, number])
-            _print_row(title, recorded(plant, kind, wanted.minutes, wanted.rate, rng, hand=hand))
+            _print_row(name, recorded(plant, kind, wanted.minutes, wanted.rate, rng, hand=hand))
 
-        timed(name, shipped(0), 0)
-        timed(f"{name}, by hand", shipped(0), 0, hand=True)
-        for seed in range(wanted.seeds):
-            timed(f"{name}, drawn {seed}", drawn(seed), seed + 1)
+
+def vehicles(seeds: int, *, is_differential: bool) -> Iterator[tuple[str, Plant, int, bool]]:
+    """Yield name, plant, number of the drive, and whether it is by hand: as they ship, and `seeds` drawn at random."""
+    shipped, drawn = (differential_plant, random_differential_plant) if is_differential else (make_plant, random_plant)
+    name = "differential" if is_differential else "two axles"
+    yield name, shipped(0), 0, False
+    yield f"{name}, by hand", shipped(0), 0, True
+    for seed in range(seeds):
+        yield f"{name}, drawn {seed}", drawn(seed), seed + 1, False
 
 
 def _print_row(name: str, campaign: Part) -> None:

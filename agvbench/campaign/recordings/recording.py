@@ -163,13 +163,11 @@ def _require_common_time(path: Path, poses: Poses, commands: Commands) -> None:
 def _require_fine_times(path: Path, t_s: Floats, x_m: Floats, y_m: Floats) -> None:
     """Raise `FileError` if most poses that moved have the time of the pose before, and times are far apart."""
     moved = np.hypot(np.diff(x_m), np.diff(y_m)) > _MOVED_M
-    shared = moved & (np.diff(t_s) == 0.0)
-    later_s = np.diff(np.unique(t_s))
-    if 2 * np.count_nonzero(shared) <= np.count_nonzero(moved) or not len(later_s):
+    later_s = np.diff(t_s)
+    if not (moved.any() and (later_s > 0.0).any()):
         return
-    interval_s = float(np.median(later_s))
-    if interval_s > _COARSEST_S * (1.0 + _ROUNDING):
-        share = np.count_nonzero(shared) / np.count_nonzero(moved)
+    share, interval_s = float(np.mean(later_s[moved] == 0.0)), float(np.median(later_s[later_s > 0.0]))
+    if share > _MOST_SHARED and interval_s > _COARSEST_S * (1.0 + _ROUNDING):
         raise FileError(
             "times are coarser than poses",
             where=path,
@@ -188,5 +186,5 @@ def _apart(path: Path, what: str, told: str) -> FileError:
 _LONGEST_HELD_S = 60.0
 """A last command that has been held for longer before the first pose is of another clock."""
 
-_MOVED_M, _COARSEST_S, _ROUNDING = 1e-3, 0.05, 1e-6
+_MOVED_M, _MOST_SHARED, _COARSEST_S, _ROUNDING = 1e-3, 0.5, 0.05, 1e-6
 """Poses that are further apart than noise are different ones, and one that is so early or late is a wrong one."""

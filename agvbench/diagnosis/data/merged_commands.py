@@ -5,8 +5,8 @@ time as a large one. Successive commands are replaced by their mean. Where they 
 channel and last for T together, the integral of the difference is ρ T / 4 at most: that of a step over the whole range
 which comes ρ T / 4 early or late. Time stamps are not so exact.
 
-Long before a window, only controllers with a memory of seconds still know of a command, and of its mean rather than of
-its steps: there it may be merged for longer.
+Long before a window, only controllers with time constants of seconds still depend on a command, and on its mean rather
+than its steps: there commands are merged for longer.
 """
 
 from __future__ import annotations

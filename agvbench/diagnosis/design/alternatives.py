@@ -10,12 +10,11 @@ from itertools import combinations
 import numpy as np
 
 from agvbench.diagnosis.criteria import SELECTION
-from agvbench.diagnosis.estimation.fit import Fit, fit
+from agvbench.diagnosis.estimation.fit import Fit, fit_near
 from agvbench.diagnosis.model.predictor import Predictor
 from agvbench.diagnosis.selection.candidates import Candidate, bounds_of, candidate
 from agvbench.diagnosis.selection.variants import simulated_variants
 from agvbench.effects.variants import cause_of
-from agvbench.types import Floats
 
 _FEW_ITERATIONS, _MANY_ITERATIONS = 2, 8
 _MAX_PAIRS = 3
@@ -81,26 +80,16 @@ def _with_equation(chosen: Fit, name: str, equation: Candidate) -> Fit | None:
     kept = [value for key, value in chosen.effect_values().items() if key.partition(".")[0] != replaced]
     maps = chosen.parameters[: chosen.predictor.maps.size]
 
-    def fitted(parameters: Floats, near: Fit, iterations: int) -> Fit:
-        return fit(
-            predictor,
-            parameters,
-            bounds,
-            random_effects=near.random_effects,
-            variance_components=near.variance_components,
-            iterations=iterations,
-            near=near.linear,
-        )
-
     found = []
     for start in equation.starts:
         with suppress(np.linalg.LinAlgError):
-            found.append(fitted(np.r_[maps, kept, start], chosen, _FEW_ITERATIONS))
+            parameters = np.r_[maps, kept, start]
+            found.append(fit_near(chosen, predictor, parameters, bounds, iterations=_FEW_ITERATIONS))
     if not found:
         return None
     best = min(found, key=lambda f: f.total_loss)
     try:
-        return fitted(best.parameters, best, _MANY_ITERATIONS)
+        return fit_near(best, predictor, best.parameters, bounds, iterations=_MANY_ITERATIONS)
     except np.linalg.LinAlgError:
         return best
 

@@ -178,6 +178,31 @@ def fit(
     )  # fmt: skip
 
 
+def fit_near(
+    known: Fit,
+    predictor: Predictor,
+    parameters: Floats,
+    bounds: Floats,
+    *,
+    iterations: int = _ITERATIONS,
+    patient: bool = False,
+) -> Fit:
+    """Fit a model from the random effects, variance components and derivatives of a `known` one with the same maps.
+
+    For the other arguments see `fit`.
+    """
+    return fit(
+        predictor,
+        parameters,
+        bounds,
+        random_effects=known.random_effects,
+        variance_components=known.variance_components,
+        iterations=iterations,
+        patient=patient,
+        near=known.linear,
+    )
+
+
 def loss_at(fitted: Fit, parameters: Floats) -> Floats:
     """Return each run's loss (R,) at other parameters, by simulation, with the variance components of `fitted`."""
     predictor = fitted.predictor

@@ -22,6 +22,7 @@ from agvbench.diagnosis.data.readings import Readings
 from agvbench.diagnosis.data.window_splits import _initial_states
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
+from agvbench.model.simulation.layout import INITIAL_SPEED
 from agvbench.model.simulation.simulation import Simulation
 from agvbench.signals import robust_std
 from agvbench.types import Commands, Floats
@@ -178,7 +179,7 @@ def _distance_deviations(predictor: Predictor, parameters: Floats) -> Floats:
     """
     readings, rows = predictor.readings, np.arange(len(predictor.readings))
     settled, initial = predictor.settled(parameters)
-    initial[:, 3] = np.nan
+    initial[:, INITIAL_SPEED] = np.nan
     poses = predictor.batch.base.predict(settled, predictor.all_parameters(parameters), initial)
     last = readings.seen.shape[1] - 1 - np.argmax(readings.seen[:, ::-1], axis=1)
     ends = readings.poses[rows, last], poses.reshape(len(rows), -1, 3)[rows, last]
@@ -206,7 +207,7 @@ def _speed_deviations(predictor: Predictor, parameters: Floats) -> Floats:
         for run, begins_s in zip(predictor.readings.simulated(), initial_states.t_s.tolist(), strict=True)
     ]
     settled, initial = predictor.settled(parameters)
-    initial[:, 3] = np.nan
+    initial[:, INITIAL_SPEED] = np.nan
     simulation = Simulation(batch.geometry, batch.maps.neutral, short_runs, kinds=batch.kinds)
     moved = simulation.predict(settled, predictor.all_parameters(parameters), initial) - initial[:, :3]
     predicted = (np.cos(initial[:, 2]) * moved[:, 0] + np.sin(initial[:, 2]) * moved[:, 1]) / _SHORT_S

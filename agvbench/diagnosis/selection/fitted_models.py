@@ -13,7 +13,7 @@ from agvbench.diagnosis.criteria import FIT, SELECTION, SelectionCriteria
 from agvbench.diagnosis.data.splits import folds
 from agvbench.diagnosis.data.window_splits import fold_groups
 from agvbench.diagnosis.estimation.cross_validation import FOLDS, cross_validated
-from agvbench.diagnosis.estimation.fit import Fit, fit
+from agvbench.diagnosis.estimation.fit import Fit, fit, fit_near
 from agvbench.diagnosis.estimation.score_test import first_order_gain, initial_parameters
 from agvbench.diagnosis.method import OnProgress
 from agvbench.diagnosis.model.batch import Batch
@@ -305,16 +305,11 @@ class FittedModels:
         request = Request(frozenset(names), starts)
         if request not in self._known:
             bounds = bounds_of(names)
-            fitted = fit(
-                self._predictor(names) if near is None or near.predictor.effects != names else near.predictor,
-                parameters,
-                bounds,
-                random_effects=None if near is None else near.random_effects,
-                variance_components=None if near is None else near.variance_components,
-                iterations=FIT.steps,
-                patient=patient,
-                near=None if near is None else near.linear,
-            )
+            if near is None:
+                fitted = fit(self._predictor(names), parameters, bounds, iterations=FIT.steps, patient=patient)
+            else:
+                predictor = near.predictor if near.predictor.effects == names else self._predictor(names)
+                fitted = fit_near(near, predictor, parameters, bounds, iterations=FIT.steps, patient=patient)
             self.tried += 1
             self._known[request] = ScoredModel(names, fitted, cross_validated(fitted, self._fold, bounds), starts)
         return self._known[request]
@@ -333,15 +328,8 @@ class FittedModels:
         """
         own = model.fit
         try:
-            preliminary = fit(
-                self._predictor(model.names),
-                own.parameters,
-                own.bounds,
-                random_effects=own.random_effects,
-                variance_components=own.variance_components,
-                iterations=FIT.few_steps,
-                near=own.linear,
-            )
+            predictor = self._predictor(model.names)
+            preliminary = fit_near(own, predictor, own.parameters, own.bounds, iterations=FIT.few_steps)
             if preliminary.total_loss - preliminary.decrement > own.total_loss:
                 return None
             return self.score(model.names, preliminary.parameters, preliminary)

@@ -44,7 +44,7 @@ def select_with_initial_steering(selector: AnySelector) -> tuple[Selection, AnyS
     while True:  # each step and each change reduces the deviance
         larger, rejected = here.step(current)
         if larger is None:
-            return reconsider_initial_steering(here.completed(current, rejected), here)
+            return _reconsidered(here.completed(current, rejected), here, other)
         current, there = larger, other.refitted_if_better(larger)
         if there is not None and there.deviance < current.deviance - SELECTION.min_gain:
             here, other, current = other, here, there
@@ -58,11 +58,15 @@ def reconsider_initial_steering(selection: Selection, selector: AnySelector) -> 
     """
     if not has_initial_steering(selector):
         return selection, selector
+    return _reconsidered(selection, selector, under_other_initial_steering(selector))
+
+
+def _reconsidered(selection: Selection, selector: AnySelector, other: AnySelector) -> tuple[Selection, AnySelector]:
+    """Return the selection with its selector, or that of the `other` selector; see `reconsider_initial_steering`."""
     chosen = selection.chosen
     has_delay = bool(set(STEERING_DYNAMICS) & {cause_of(name) for name in chosen.names})
     if not has_delay and chosen.names == selector.given:
         return selection, selector
-    other = under_other_initial_steering(selector)
     there = other.refitted(chosen)
     if there is None:
         return selection, selector

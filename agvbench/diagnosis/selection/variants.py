@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from agvbench.diagnosis.criteria import FIT, SELECTION, VARIANT
-from agvbench.diagnosis.estimation.fit import fit
+from agvbench.diagnosis.estimation.fit import fit_near
 from agvbench.diagnosis.estimation.score_test import first_order_gain
 from agvbench.diagnosis.model.batch import Batch
 from agvbench.diagnosis.model.predictor import Predictor
@@ -306,14 +306,10 @@ def substituted(extended: Selector, current: ScoredModel, out: set[str], other: 
     starts = frozenset(start for start in current.starts if start[0] not in out) | other.key
     maps = current.fit.parameters[: extended.batch.maps.size]
     near = current.fit
+    predictor, bounds = Predictor(extended.batch, names), bounds_of(names)
     fits = [
-        fit(
-            Predictor(extended.batch, names), np.r_[maps, kept, start], bounds_of(names),
-            random_effects=near.random_effects, variance_components=near.variance_components,
-            iterations=FIT.few_steps, near=near.linear,
-        )
-        for start in other.starts
-    ]  # fmt: skip
+        fit_near(near, predictor, np.r_[maps, kept, start], bounds, iterations=FIT.few_steps) for start in other.starts
+    ]
     best = min(fits, key=lambda one: one.total_loss)
     if best.total_loss - best.decrement > near.total_loss + VARIANT.max_fit_loss:
         return extended.unfinished(best, starts)  # further steps would not compensate for it
